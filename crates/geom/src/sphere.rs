@@ -1,0 +1,109 @@
+//! Bounding spheres in local space.
+
+use glam::{DVec3, Vec3};
+
+/// A ball: everything within `radius` of `center`. Local space unless a name says otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius, ≥ 0.
+    pub radius: f32,
+}
+
+impl Sphere {
+    /// True when `inner` lies inside this ball. Decided in `f64` on the values as they are, so neither a rounding of the
+    /// caller's nor a tolerance hides in the answer.
+    pub fn encloses(&self, inner: &Sphere) -> bool {
+        let reach = f64::from(self.radius) - f64::from(inner.radius);
+        reach >= 0.0 && (self.center.as_dvec3() - inner.center.as_dvec3()).length_squared() <= reach * reach
+    }
+
+    /// The smallest ball around both, rounded outwards: it [`encloses`](Self::encloses) both.
+    pub fn around(a: &Sphere, b: &Sphere) -> Sphere {
+        let (ca, cb) = (a.center.as_dvec3(), b.center.as_dvec3());
+        let (ra, rb) = (f64::from(a.radius), f64::from(b.radius));
+        let apart = (cb - ca).length();
+        if apart + rb <= ra {
+            return *a;
+        }
+        if apart + ra <= rb {
+            return *b;
+        }
+        let radius = (apart + ra + rb) * 0.5;
+        let center = (ca + (cb - ca) * ((radius - ra) / apart)).as_vec3();
+        Self::outward(center, [(ca, ra), (cb, rb)])
+    }
+
+    /// The ball at `center` that encloses the given balls, its radius rounded up to `f32` far enough for
+    /// [`encloses`](Self::encloses) to agree.
+    pub fn outward<const N: usize>(center: Vec3, balls: [(DVec3, f64); N]) -> Sphere {
+        let at = center.as_dvec3();
+        let reach = balls.iter().fold(0.0_f64, |reach, (c, r)| reach.max((*c - at).length() + r));
+        // Two roundings of f64 (the length, the later squares) stay far below one step of f32.
+        Sphere { center, radius: round_up(reach * (1.0 + 1e-14)) }
+    }
+}
+
+/// The smallest `f32` that is not below `value`.
+pub fn round_up(value: f64) -> f32 {
+    let nearest = value as f32;
+    if f64::from(nearest) < value { nearest.next_up() } else { nearest }
+}
+
+/// Radius of the smallest ball around a triangle: half the longest edge where the angle opposite is 90° or more, else the
+/// circumscribed radius. Zero-area triangles, slivers and single points included.
+pub fn triangle_bounding_radius([a, b, c]: [DVec3; 3]) -> f64 {
+    let mut edges = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
+    edges.sort_by(f64::total_cmp);
+    let [short, middle, long] = edges;
+    if short + middle <= long {
+        return long.sqrt() * 0.5;
+    }
+    let twice_area = (b - a).cross(c - a).length();
+    let circumscribed = (short * middle).sqrt() * long.sqrt() / (2.0 * twice_area);
+    // An acute triangle's circumscribed radius is at most 1/√3 of its longest edge; the bound catches a cancelled area.
+    if circumscribed.is_finite() { circumscribed.min(long.sqrt() * 0.577_350_27) } else { long.sqrt() * 0.577_350_27 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn spheres() -> impl Strategy<Value = Sphere> {
+        (prop::array::uniform3(-1e3f32..1e3), 0f32..100.0)
+            .prop_map(|(center, radius)| Sphere { center: Vec3::from_array(center), radius })
+    }
+
+    proptest! {
+        #[test]
+        fn around_encloses_both_and_is_no_larger_than_it_must(a in spheres(), b in spheres()) {
+            let ball = Sphere::around(&a, &b);
+            prop_assert!(ball.encloses(&a) && ball.encloses(&b));
+            let apart = (a.center.as_dvec3() - b.center.as_dvec3()).length();
+            let least = ((apart + f64::from(a.radius) + f64::from(b.radius)) * 0.5).max(f64::from(a.radius.max(b.radius)));
+            prop_assert!(f64::from(ball.radius) <= least + 1e-3);
+        }
+
+        #[test]
+        fn balls_of_the_bounding_radius_at_the_corners_cover_a_triangle(
+            corners in prop::array::uniform3(prop::array::uniform3(-1f64..1.0)), u in 0f64..1.0, v in 0f64..1.0,
+        ) {
+            let corners = corners.map(DVec3::from_array);
+            let radius = triangle_bounding_radius(corners);
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            let inside = corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v;
+            let nearest = corners.iter().map(|c| (*c - inside).length()).fold(f64::INFINITY, f64::min);
+            prop_assert!(nearest <= radius * (1.0 + 1e-9), "{nearest} {radius}");
+        }
+    }
+
+    #[test]
+    fn degenerate_triangles_have_the_radius_of_their_longest_edge() {
+        let p = DVec3::new(1e6, 2e6, 3e6);
+        assert_eq!(triangle_bounding_radius([p; 3]), 0.0);
+        assert_eq!(triangle_bounding_radius([p, p, p + DVec3::X]), 0.5);
+        assert_eq!(triangle_bounding_radius([DVec3::ZERO, DVec3::X, DVec3::X * 3.0]), 1.5);
+    }
+}
