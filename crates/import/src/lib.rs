@@ -1,0 +1,53 @@
+//! Model files as bounded-memory streams.
+//!
+//! Bytes go in ([`ByteSource`]; this crate opens no file), batches of vertices and triangles come out ([`ModelStream`]), in
+//! whatever order the file has them: memory stays bounded by the batch, not by the model. Start at [`open()`].
+//!
+//! What always holds, whatever the bytes: positions are finite; every triangle index is below the stream's number of
+//! vertices; polygons and strips arrive as triangles; an error names where in the file it is, what was expected and what was
+//! found; no input panics, hangs, or makes a reader allocate more than a few batches.
+#![forbid(unsafe_code)]
+
+mod batch;
+mod error;
+mod input;
+mod open;
+pub mod ply;
+
+pub use batch::{Attributes, Batch, VertexBatch};
+pub use error::{ImportError, Item, Place, Position, Problem};
+pub use open::open;
+
+use gigalod_geom::camera::UpAxis;
+use std::io::{Read, Seek};
+
+/// Where a reader gets its bytes: a file, a buffer in memory, later a range reader over HTTP.
+pub trait ByteSource: Read + Seek + Send {}
+impl<T: Read + Seek + Send> ByteSource for T {}
+
+/// One model, read front to back.
+pub trait ModelStream: Send {
+    /// What the vertices carry besides positions; known before the first batch.
+    fn attributes(&self) -> Attributes;
+
+    /// The file format's convention for the sky.
+    fn up_axis(&self) -> UpAxis {
+        UpAxis::Y
+    }
+
+    /// Number of vertices, where the file says so before they come. Checked against what comes.
+    fn declared_vertices(&self) -> Option<u64>;
+
+    /// Number of faces (polygons, not triangles), where the file says so before they come.
+    fn declared_faces(&self) -> Option<u64>;
+
+    /// Replaces the contents of `batch` by the next vertices and/or triangles; returns false, with an empty batch, after the
+    /// last. Vertices are numbered in the order in which they come; a triangle may come before its vertices.
+    ///
+    /// # Errors
+    /// The first thing that is wrong with the file; the stream is not to be used after it.
+    fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError>;
+
+    /// Bytes of the source consumed so far and in all, for progress bars (compressed bytes of a compressed file).
+    fn bytes_consumed(&self) -> (u64, u64);
+}

@@ -1,0 +1,12 @@
+//! The PLY reader from outside: bytes in, batches or an error out.
+
+mod damage;
+mod document;
+mod errors;
+mod gzip;
+mod header;
+mod real_files;
+mod round_trip;
+mod sources;
+mod text;
+mod values;
