@@ -1,0 +1,38 @@
+//! Builders: a model stream goes in, a complete `.glod` file comes out, or an error and no file at all.
+//!
+//! One module for each representation; [`splats::build`] is the first. What always holds: the bytes depend on the input and
+//! the options alone, not on threads, machines or the clock; nothing appears under the output's name until it is complete.
+#![forbid(unsafe_code)]
+
+mod error;
+mod output;
+mod progress;
+pub mod splats;
+
+pub use error::BuildError;
+pub use output::Output;
+pub use progress::{NoProgress, PhaseTime, Progress, Report};
+
+use gigalod_geom::camera::UpAxis;
+
+/// What the user may choose; the same for all representations.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Most bytes that the builder may allocate.
+    pub memory_bytes: u64,
+    /// Worker threads; 0 for one a core.
+    pub threads: usize,
+    /// Overrides the format's convention.
+    pub up: Option<UpAxis>,
+}
+
+impl Options {
+    /// Smallest budget that is accepted: 64 MiB.
+    pub const LEAST_MEMORY_BYTES: u64 = 64 << 20;
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { memory_bytes: 2 << 30, threads: 0, up: None }
+    }
+}

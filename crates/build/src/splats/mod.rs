@@ -1,0 +1,111 @@
+//! Splats: the bounding-sphere hierarchy of the splats paper, section 2.2, from a triangle mesh.
+//!
+//! The way of the data, a file for each step:
+//!
+//! ```text
+//! mesh ──▶ leaves ──▶ tree ──▶ contract ──▶ quantise ──▶ layout ──▶ pages
+//! stream   a sphere   binary,  2–4 children  codes,       breadth-first
+//!          a vertex   midpoint  a node       top-down     families
+//! ```
+//!
+//! What always holds: each decoded sphere encloses the true sphere of its node, and with it all true leaves below; each
+//! node's cone holds the cones of its children as decoded, and a leaf's cone the normals of all triangles at its vertex.
+//! The tree depends on the set of vertices alone, not on their order.
+
+mod contract;
+mod layout;
+mod leaves;
+mod mesh;
+mod orientation;
+mod quantise;
+mod tree;
+
+#[cfg(test)]
+mod tests;
+
+use crate::output::Output;
+use crate::progress::{Phases, Progress, Report};
+use crate::{BuildError, Options};
+use gigalod_format::splats::{Root, Skeleton};
+use gigalod_format::{Bounds, InputCounts, Kind, Metadata};
+use gigalod_import::ModelStream;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Builds `out` from a mesh.
+///
+/// # Errors
+/// Whatever is wrong with the input, the budget or the output; `out` is then as it was before.
+pub fn build(
+    mut input: Box<dyn ModelStream>,
+    options: &Options,
+    progress: &dyn Progress,
+    out: &Path,
+) -> Result<Report, BuildError> {
+    let output = Output::create(out).map_err(BuildError::Output)?;
+    let phases = Phases::new(progress);
+    let workers = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .build()
+        .map_err(|error| BuildError::Threads(error.to_string()))?;
+
+    let mesh = mesh::read(&mut *input, options.memory_bytes, &phases)?;
+    let up = options.up.unwrap_or(input.up_axis());
+    let counts =
+        InputCounts { triangles: mesh.triangles.len() as u64, vertices: mesh.positions.len() as u64, points: 0 };
+    drop(input);
+
+    phases.begin("leaves", 0);
+    let leaves::Leaves { mut leaves, origin, bounds, closed, has_colors } = leaves::from_mesh(mesh)?;
+
+    let (tree, quantised) = workers.install(|| {
+        phases.begin("tree", 0);
+        let mut tree = tree::build(&mut leaves);
+        contract::set_cones(&mut tree);
+        phases.begin("quantise", 0);
+        let quantised = quantise::top_down(&mut tree);
+        (tree, quantised)
+    });
+    drop(leaves);
+
+    phases.begin("write", tree.len() as u64);
+    let layout::Written { writer, pages, nodes, leaves, levels, raw_bytes } =
+        layout::write(&tree, has_colors, output.file(), &phases).map_err(BuildError::Output)?;
+    let root = Root {
+        origin,
+        sphere: tree[0].sphere,
+        overhang: quantised.overhang,
+        bounds,
+        nodes,
+        leaves,
+        levels: levels.len() as u32,
+        has_colors,
+        closed,
+        up,
+    };
+    let mut attributes = vec!["normals".to_string()];
+    if has_colors {
+        attributes.push("colors".into());
+    }
+    let skeleton = Skeleton::encode(&root, &pages);
+    let metadata = Metadata {
+        generator: concat!("gigalod ", env!("CARGO_PKG_VERSION")).into(),
+        input: counts,
+        options: BTreeMap::from([
+            ("as".into(), Kind::Splats.name().into()),
+            ("up".into(), format!("{up:?}").to_lowercase()),
+        ]),
+        nodes: root.nodes,
+        levels: root.levels,
+        leaves: root.leaves,
+        raw_bytes: raw_bytes + skeleton.len() as u64,
+        closed,
+        bounds: Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() },
+        attributes,
+        per_level: levels,
+    };
+    let (buffer, output_bytes) = writer.finish(&skeleton, &metadata).map_err(BuildError::Output)?;
+    drop(buffer);
+    output.publish().map_err(BuildError::Output)?;
+    Ok(Report { metadata, output_bytes, phases: phases.times() })
+}

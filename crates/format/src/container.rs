@@ -1,0 +1,264 @@
+//! The outer layer of a `.glod` file: a fixed header that says where skeleton, pages and metadata lie.
+//!
+//! ```text
+//! 0        128            …                …             file_bytes
+//! │ header │ skeleton     │ pages          │ metadata    │
+//! ```
+//! Everything that is needed to draw comes first; pages stand in the order in which they are first needed.
+
+use crate::bytes::Fields;
+use crate::{FormatError, Metadata, PageStore};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::sync::Arc;
+
+/// First bytes of every file: not text (high bit), and a transfer that mends line ends breaks it visibly.
+pub const MAGIC: [u8; 8] = *b"\x89GLOD\r\n\x1a";
+/// The only version there is.
+pub const VERSION: u32 = 1;
+/// Bytes before the skeleton.
+pub const HEADER_BYTES: u64 = 128;
+/// Names of the feature bits that a reader must know to read a file; none yet.
+const FEATURES: [&str; 0] = [];
+/// More is not a skeleton but an attack: 2^32 page records would not fit either.
+const MAX_METADATA_BYTES: u64 = 16 << 20;
+
+/// Which representation a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Bounding spheres: [`crate::splats`].
+    Splats,
+}
+
+impl Kind {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Splats => "splats",
+        }
+    }
+
+    fn code(self) -> u32 {
+        match self {
+            Self::Splats => 1,
+        }
+    }
+}
+
+/// A checksummed range of the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Section {
+    /// First byte.
+    pub offset: u64,
+    /// Length.
+    pub bytes: u64,
+    /// CRC-32C of its bytes.
+    pub checksum: u32,
+}
+
+/// An open file: header checked, nothing else read.
+#[derive(Clone)]
+pub struct Container {
+    store: Arc<dyn PageStore>,
+    kind: Kind,
+    skeleton: Section,
+    metadata: Section,
+    pages_offset: u64,
+}
+
+impl std::fmt::Debug for Container {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Container").field("kind", &self.kind).field("bytes", &self.store.len()).finish_non_exhaustive()
+    }
+}
+
+impl Container {
+    /// Reads and checks the header.
+    ///
+    /// # Errors
+    /// Anything but [`FormatError::Invalid`] of a page: this is the first look at untrusted bytes.
+    pub fn open(store: Arc<dyn PageStore>) -> Result<Self, FormatError> {
+        let mut header = [0; HEADER_BYTES as usize];
+        let present = store.len().min(HEADER_BYTES) as usize;
+        store
+            .read_at(0, &mut header[..present])
+            .map_err(|source| FormatError::Io { what: "the header".into(), source })?;
+        let magic = &header[..present.min(MAGIC.len())];
+        if magic != MAGIC {
+            return Err(FormatError::Magic {
+                found: format!("\"{}\"", magic.escape_ascii()),
+                expected: format!("\"{}\"", MAGIC.escape_ascii()),
+            });
+        }
+        if present < HEADER_BYTES as usize {
+            return Err(truncated("the header", HEADER_BYTES, store.len()));
+        }
+        let mut fields = Fields(&header[MAGIC.len()..]);
+        // The version first: a later one may define everything after it anew.
+        let version = fields.u32();
+        if version != VERSION {
+            return Err(FormatError::Version { found: version, expected: VERSION });
+        }
+        let expected = u32::from_le_bytes(*header.last_chunk().expect("the header has 128 bytes"));
+        check("the header", &header[..header.len() - 4], expected)?;
+        let kind_code = fields.u32();
+        let features = fields.u64();
+        let file_bytes = fields.u64();
+        let skeleton = Section { offset: fields.u64(), bytes: fields.u64(), checksum: fields.u32() };
+        let metadata_checksum = fields.u32();
+        let metadata = Section { offset: fields.u64(), bytes: fields.u64(), checksum: metadata_checksum };
+        let pages_offset = fields.u64();
+        let unknown = features.trailing_zeros();
+        if features >> FEATURES.len() != 0 {
+            let name = FEATURES.get(unknown as usize).map_or(format!("feature bit {unknown}"), |name| name.to_string());
+            return Err(FormatError::Feature { name });
+        }
+        if kind_code != Kind::Splats.code() {
+            let found = format!("representation {kind_code}");
+            return Err(FormatError::Kind { found, expected: "representation 1 (splats)".into() });
+        }
+        if file_bytes != store.len() {
+            return Err(truncated("the file, by its header,", file_bytes, store.len()));
+        }
+        for (what, section) in [("the skeleton", skeleton), ("the metadata", metadata)] {
+            let end = section.offset.saturating_add(section.bytes);
+            if end > file_bytes {
+                return Err(truncated(what, end, file_bytes));
+            }
+        }
+        if pages_offset > file_bytes {
+            return Err(truncated("the first page", pages_offset, file_bytes));
+        }
+        Ok(Self { store, kind: Kind::Splats, skeleton, metadata, pages_offset })
+    }
+
+    /// Which representation it holds.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// Where its bytes lie.
+    pub fn store(&self) -> &Arc<dyn PageStore> {
+        &self.store
+    }
+
+    /// Where the first page begins.
+    pub fn pages_offset(&self) -> u64 {
+        self.pages_offset
+    }
+
+    /// The bytes of the skeleton, checked.
+    ///
+    /// # Errors
+    /// [`FormatError::Checksum`] and [`FormatError::Io`].
+    pub fn read_skeleton(&self) -> Result<Vec<u8>, FormatError> {
+        self.read("the skeleton", self.skeleton)
+    }
+
+    /// What `info` shows.
+    ///
+    /// # Errors
+    /// As for the skeleton, and [`FormatError::Invalid`] where it is not the JSON it should be.
+    pub fn read_metadata(&self) -> Result<Metadata, FormatError> {
+        let what = "the metadata";
+        if self.metadata.bytes > MAX_METADATA_BYTES {
+            let problem = format!("{} bytes, expected at most {MAX_METADATA_BYTES}", self.metadata.bytes);
+            return Err(FormatError::invalid(what, problem));
+        }
+        let bytes = self.read(what, self.metadata)?;
+        serde_json::from_slice(&bytes).map_err(|error| FormatError::invalid(what, error.to_string()))
+    }
+
+    fn read(&self, what: &str, section: Section) -> Result<Vec<u8>, FormatError> {
+        read_checked(&*self.store, what, section)
+    }
+}
+
+/// Reads a range whose end was checked against the store's length, and checks its checksum.
+pub(crate) fn read_checked(store: &dyn PageStore, what: &str, section: Section) -> Result<Vec<u8>, FormatError> {
+    let mut bytes = vec![0; section.bytes as usize];
+    store.read_at(section.offset, &mut bytes).map_err(|source| FormatError::Io { what: what.into(), source })?;
+    check(what, &bytes, section.checksum)?;
+    Ok(bytes)
+}
+
+/// CRC-32C, as it stands beside each section and page.
+pub fn checksum(bytes: &[u8]) -> u32 {
+    crc32c::crc32c(bytes)
+}
+
+fn check(what: &str, bytes: &[u8], expected: u32) -> Result<(), FormatError> {
+    let found = checksum(bytes);
+    if found == expected { Ok(()) } else { Err(FormatError::Checksum { what: what.into(), expected, found }) }
+}
+
+fn truncated(what: &str, end: u64, file_bytes: u64) -> FormatError {
+    FormatError::Truncated { what: what.into(), end, file_bytes }
+}
+
+/// Writes a container: pages as they come, then [`Writer::finish`] puts skeleton, metadata and header in their places.
+///
+/// Until then the header is zero, so a file that was left half-written is no container.
+pub struct Writer<W> {
+    out: W,
+    kind: Kind,
+    skeleton_bytes: u64,
+    position: u64,
+}
+
+impl<W: Write + Seek> Writer<W> {
+    /// Leaves room for the header and a skeleton of exactly `skeleton_bytes`.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn new(mut out: W, kind: Kind, skeleton_bytes: u64) -> io::Result<Self> {
+        out.seek(SeekFrom::Start(0))?;
+        io::copy(&mut io::Read::take(io::repeat(0), HEADER_BYTES + skeleton_bytes), &mut out)?;
+        Ok(Self { out, kind, skeleton_bytes, position: HEADER_BYTES + skeleton_bytes })
+    }
+
+    /// Appends a page.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn page(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.position += bytes.len() as u64;
+        self.out.write_all(bytes)
+    }
+
+    /// Completes the file; returns what was written to, and the number of bytes.
+    ///
+    /// # Errors
+    /// What the system says.
+    ///
+    /// # Panics
+    /// When the skeleton is not as long as announced.
+    pub fn finish(mut self, skeleton: &[u8], metadata: &Metadata) -> io::Result<(W, u64)> {
+        assert_eq!(skeleton.len() as u64, self.skeleton_bytes, "the skeleton has the announced size");
+        let metadata_offset = self.position;
+        let metadata = serde_json::to_vec(metadata)?;
+        self.out.write_all(&metadata)?;
+        let file_bytes = metadata_offset + metadata.len() as u64;
+
+        let mut header = Vec::with_capacity(HEADER_BYTES as usize);
+        header.extend(MAGIC);
+        header.extend(VERSION.to_le_bytes());
+        header.extend(self.kind.code().to_le_bytes());
+        for field in [0, file_bytes, HEADER_BYTES, self.skeleton_bytes] {
+            header.extend(u64::to_le_bytes(field));
+        }
+        header.extend(checksum(skeleton).to_le_bytes());
+        header.extend(checksum(&metadata).to_le_bytes());
+        for field in [metadata_offset, metadata.len() as u64, HEADER_BYTES + self.skeleton_bytes] {
+            header.extend(field.to_le_bytes());
+        }
+        header.resize(HEADER_BYTES as usize - 4, 0);
+        header.extend(checksum(&header).to_le_bytes());
+
+        self.out.seek(SeekFrom::Start(0))?;
+        self.out.write_all(&header)?;
+        self.out.write_all(skeleton)?;
+        self.out.flush()?;
+        Ok((self.out, file_bytes))
+    }
+}

@@ -1,0 +1,69 @@
+//! What `info` tells about a file: a JSON object at its end, not needed for drawing.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Counts of what was read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputCounts {
+    /// Triangles, polygons and strips taken apart.
+    pub triangles: u64,
+    /// Vertices, unreferenced ones included.
+    pub vertices: u64,
+    /// Points that came without a mesh.
+    pub points: u64,
+}
+
+/// An axis-aligned box; model space.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bounds {
+    /// Smallest coordinates.
+    pub min: [f64; 3],
+    /// Largest coordinates.
+    pub max: [f64; 3],
+}
+
+/// What one level of a hierarchy holds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LevelSummary {
+    /// 0 is the root.
+    pub level: u32,
+    /// Nodes on this level.
+    pub nodes: u64,
+    /// Triangles of their payloads.
+    pub triangles: u64,
+    /// Points of their payloads.
+    pub points: u64,
+    /// Bytes of pages; a page that holds several levels is shared out by their nodes.
+    pub bytes: u64,
+    /// Largest `error_geo` of these nodes, in model units.
+    pub max_error: f64,
+}
+
+/// Facts about a file and how it was built. Never a time, a path or a machine: same input and options, same bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// Program and version that built it.
+    pub generator: String,
+    /// What was read.
+    pub input: InputCounts,
+    /// Build options by their command-line names.
+    pub options: BTreeMap<String, String>,
+    /// All nodes.
+    pub nodes: u64,
+    /// Number of levels.
+    pub levels: u32,
+    /// Nodes without children.
+    pub leaves: u64,
+    /// Size before entropy coding: the skeleton, nodes, colours, group sizes, and a 16-bit page-relative pointer for each
+    /// group that needs one.
+    pub raw_bytes: u64,
+    /// True when the mesh was proved closed and consistently oriented.
+    pub closed: bool,
+    /// Around all referenced vertices.
+    pub bounds: Bounds,
+    /// Of `"normals"`, `"colors"`, …: what the nodes carry.
+    pub attributes: Vec<String>,
+    /// Coarse to fine.
+    pub per_level: Vec<LevelSummary>,
+}

@@ -1,0 +1,291 @@
+//! All commands and their options.
+
+use super::parse;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use gigalod_geom::ImageSize;
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// Shows models too big for memory at a guaranteed error on screen.
+///
+/// Convert once with `build`, look at once with `render`. New here? Run `gigalod demo`.
+#[derive(Parser, Debug)]
+#[command(version, propagate_version = true, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    /// Print one JSON object on standard output, and nothing else there
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Say more on standard error
+    #[arg(short, long, global = true)]
+    pub(crate) verbose: bool,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+pub(crate) enum Command {
+    Build(BuildArgs),
+    Render(Box<RenderArgs>),
+    Info(InfoArgs),
+    Verify(VerifyArgs),
+    Compare(CompareArgs),
+    Synth(SynthArgs),
+    Demo(DemoArgs),
+}
+
+/// Convert a model into a .glod file
+///
+/// Reads PLY (ASCII and binary, also gzipped). The output appears under its name only when it is complete.
+#[derive(Args, Debug)]
+#[command(after_help = "Example:\n  gigalod build statue.ply.gz -o statue.glod")]
+pub(crate) struct BuildArgs {
+    /// Model to convert
+    #[arg(required = true, value_name = "INPUT")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// File to write; replaced if it exists
+    #[arg(short, long, value_name = "OUT.glod")]
+    pub(crate) output: PathBuf,
+    /// Representation
+    #[arg(long = "as", value_enum, default_value_t = Representation::Auto)]
+    pub(crate) representation: Representation,
+    #[command(flatten)]
+    pub(crate) options: BuildOptions,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct BuildOptions {
+    /// Most memory to use, as 512MiB or 4GB; at least 64MiB
+    #[arg(long, default_value = "2GiB", value_parser = parse::memory, value_name = "SIZE")]
+    pub(crate) memory: u64,
+    /// Worker threads [default: one for each core]
+    #[arg(long, default_value_t = 0, hide_default_value = true, value_name = "N")]
+    pub(crate) threads: usize,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Representation {
+    /// What suits the input best: at present always splats
+    Auto,
+    /// A hierarchy of bounding spheres, drawn as points
+    Splats,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum UpAxisArg {
+    Y,
+    Z,
+}
+
+/// Draw a picture of a model
+///
+/// A raw model (PLY) is first built into the cache of the user ($XDG_CACHE_HOME/gigalod or ~/.cache/gigalod).
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  gigalod render statue.glod -o statue.png\n  \
+    gigalod render statue.glod -o face.png --orbit 30,10,4 --error 0.5\n  \
+    gigalod render statue.glod -o levels.png --lod-colors --error 8")]
+pub(crate) struct RenderArgs {
+    /// Model: .glod, or a raw one
+    pub(crate) file: PathBuf,
+    /// Picture to write; replaced if it exists
+    #[arg(short, long, value_name = "OUT.png")]
+    pub(crate) output: PathBuf,
+    /// Width and height in pixels
+    #[arg(long, default_value = "1280x720", value_parser = parse::image_size, value_name = "WxH")]
+    pub(crate) size: ImageSize,
+    #[command(flatten)]
+    pub(crate) camera: CameraArgs,
+    /// Largest error on screen, in pixels [default: 1]
+    #[arg(long, value_parser = parse::positive, value_name = "PX")]
+    pub(crate) error: Option<f64>,
+    /// Draw all leaves, whatever their size on screen
+    #[arg(long, conflicts_with = "error")]
+    pub(crate) full: bool,
+    /// Shape of splats
+    #[arg(long, value_enum, default_value_t = KernelArg::Round)]
+    pub(crate) kernel: KernelArg,
+    /// Direction towards the light [default: a lamp at the viewer's shoulder]
+    #[arg(long, value_parser = parse::direction, allow_hyphen_values = true, value_name = "X,Y,Z")]
+    pub(crate) light: Option<DVec3>,
+    /// Colour where there is nothing
+    #[arg(long, default_value = "#202024", value_parser = parse::color, value_name = "#RRGGBB")]
+    pub(crate) background: [u8; 3],
+    /// Colour each level of detail differently
+    #[arg(long)]
+    pub(crate) lod_colors: bool,
+    /// Most memory for decoded pages
+    #[arg(long, default_value = "1GiB", value_parser = parse::size, value_name = "SIZE")]
+    pub(crate) cpu_budget: u64,
+    /// Also write the distance along the view axis, in model units: one 32-bit channel Z
+    #[arg(long, value_name = "OUT.exr")]
+    pub(crate) depth: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) build: BuildOptions,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Camera")]
+pub(crate) struct CameraArgs {
+    /// Where the eye is
+    #[arg(long, value_parser = parse::vector, allow_hyphen_values = true, value_name = "X,Y,Z", requires = "target")]
+    pub(crate) eye: Option<DVec3>,
+    /// What it looks at
+    #[arg(long, value_parser = parse::vector, allow_hyphen_values = true, value_name = "X,Y,Z", requires = "eye")]
+    pub(crate) target: Option<DVec3>,
+    /// Which way is up in the picture [default: the model's up]
+    #[arg(long, value_parser = parse::direction, allow_hyphen_values = true, value_name = "X,Y,Z", requires = "eye")]
+    pub(crate) up: Option<DVec3>,
+    /// Vertical field of view, in degrees [default: 40]
+    #[arg(long, value_parser = parse::fov, value_name = "DEG")]
+    pub(crate) fov: Option<f64>,
+    /// Around the model: azimuth and elevation in degrees, and how many times nearer [default: 0,0,1]
+    #[arg(long, value_parser = parse::orbit, allow_hyphen_values = true, value_name = "AZ,EL[,ZOOM]",
+        conflicts_with_all = ["eye", "path"])]
+    pub(crate) orbit: Option<[f64; 3]>,
+    /// Camera path to take a pose from
+    #[arg(long, value_name = "PATH.json", conflicts_with = "eye", requires = "frame")]
+    pub(crate) path: Option<PathBuf>,
+    /// Which pose of the path, from 0
+    #[arg(long, value_name = "N", requires = "path")]
+    pub(crate) frame: Option<usize>,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum KernelArg {
+    /// The square around each ball's silhouette
+    Square,
+    /// Each ball's silhouette
+    Round,
+}
+
+/// Tell what a .glod file holds
+#[derive(Args, Debug)]
+pub(crate) struct InfoArgs {
+    /// File to look at
+    pub(crate) file: PathBuf,
+}
+
+/// Check a .glod file: checksums, structure, and with the original its errors
+#[derive(Args, Debug)]
+pub(crate) struct VerifyArgs {
+    /// File to check
+    pub(crate) file: PathBuf,
+    /// The model it was built from: also measure that each decoded sphere encloses what it stands for, and how far what is
+    /// drawn lies from the surface
+    #[arg(long, value_name = "ORIGINAL")]
+    pub(crate) against: Option<PathBuf>,
+}
+
+/// Measure how different two pictures of the same size are: PSNR, SSIM, FLIP, largest difference
+#[derive(Args, Debug)]
+pub(crate) struct CompareArgs {
+    /// The picture to compare with
+    #[arg(value_name = "A.png")]
+    pub(crate) reference: PathBuf,
+    /// The picture to judge
+    #[arg(value_name = "B.png")]
+    pub(crate) test: PathBuf,
+}
+
+/// Make test models and camera paths, deterministic, at any size
+#[derive(Args, Debug)]
+pub(crate) struct SynthArgs {
+    #[command(subcommand)]
+    pub(crate) what: SynthWhat,
+}
+
+#[derive(Subcommand, Debug)]
+pub(crate) enum SynthWhat {
+    /// A sculpted head with detail down to the sample spacing, as binary PLY
+    Statue(StatueArgs),
+    /// Many displaced, cut and re-sampled copies of a real scan, as binary PLY
+    Replicate(ReplicateArgs),
+    /// A camera path around a model, as JSON
+    Path(PathArgs),
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct StatueArgs {
+    /// Number of triangles, met within 1 %
+    #[arg(long, value_parser = parse::count, default_value = "2M", value_name = "N")]
+    pub(crate) triangles: u64,
+    /// Another seed, another statue
+    #[arg(long, default_value_t = 1, value_name = "S")]
+    pub(crate) seed: u64,
+    /// Give each vertex a colour
+    #[arg(long)]
+    pub(crate) colors: bool,
+    /// Order of vertices and triangles in the file
+    #[arg(long, value_enum, default_value_t = OrderArg::Coherent)]
+    pub(crate) order: OrderArg,
+    /// File to write
+    #[arg(short, long, value_name = "F.ply")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ReplicateArgs {
+    /// The scan to copy
+    pub(crate) scan: PathBuf,
+    /// Number of triangles, met within 1 %
+    #[arg(long, value_parser = parse::count, value_name = "N")]
+    pub(crate) triangles: u64,
+    /// Another seed, another heap
+    #[arg(long, default_value_t = 1, value_name = "S")]
+    pub(crate) seed: u64,
+    /// Order of vertices and triangles in the file
+    #[arg(long, value_enum, default_value_t = OrderArg::Coherent)]
+    pub(crate) order: OrderArg,
+    /// File to write
+    #[arg(short, long, value_name = "F.ply")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct PathArgs {
+    /// Which movement
+    #[arg(value_enum)]
+    pub(crate) kind: PathKindArg,
+    /// The .glod file to move around
+    #[arg(long, value_name = "FILE")]
+    pub(crate) around: PathBuf,
+    /// Length in seconds, 30 poses each
+    #[arg(long, default_value_t = 10.0, value_parser = parse::positive, value_name = "SECONDS")]
+    pub(crate) seconds: f64,
+    /// Another seed, another path
+    #[arg(long, default_value_t = 1, value_name = "S")]
+    pub(crate) seed: u64,
+    /// File to write
+    #[arg(short, long, value_name = "PATH.json")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum OrderArg {
+    /// Neighbours close together, as a scanner's software writes them
+    Coherent,
+    /// In a random order: the worst case
+    Shuffled,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PathKindArg {
+    /// Once around
+    Orbit,
+    /// From afar up to the surface
+    Approach,
+    /// Along the model, looking at it
+    Walk,
+    /// Stand, turn, stand, turn back
+    SuddenTurn,
+}
+
+/// Make a statue of 2 million triangles, build it, and draw four pictures of it
+#[derive(Args, Debug)]
+pub(crate) struct DemoArgs {
+    /// Folder for everything that is made
+    #[arg(short, long, default_value = "demo", value_name = "FOLDER")]
+    pub(crate) output: PathBuf,
+    /// Number of triangles of the statue
+    #[arg(long, value_parser = parse::count, default_value = "2M", value_name = "N")]
+    pub(crate) triangles: u64,
+}

@@ -1,0 +1,94 @@
+//! `gigalod build`.
+
+use super::args::{BuildArgs, BuildOptions};
+use super::error::{CliError, Outcome};
+use super::files;
+use super::parse::readable_bytes;
+use super::progress::Console;
+use super::usage::Usage;
+use gigalod_build::{Options, Report};
+use gigalod_format::InputCounts;
+use gigalod_geom::camera::UpAxis;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The JSON object of `build`.
+#[derive(Serialize)]
+struct BuildReport<'a> {
+    kind: &'a str,
+    input: InputCounts,
+    options: &'a BTreeMap<String, String>,
+    nodes: u64,
+    levels: u32,
+    leaves: u64,
+    output_bytes: u64,
+    seconds: f64,
+    cpu_seconds: f64,
+    peak_memory_bytes: u64,
+    phases: Vec<PhaseReport>,
+}
+
+#[derive(Serialize)]
+struct PhaseReport {
+    name: &'static str,
+    seconds: f64,
+}
+
+pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliError> {
+    let [input] = &args.inputs[..] else {
+        return Err(CliError::usage(format!("{} inputs, expected one", args.inputs.len()))
+            .hint("several files as one model are not supported yet"));
+    };
+    refuse_same_file(input, &args.output)?;
+    let usage = Usage::watch();
+    let report = build(input, &args.output, &args.options, None, console)?;
+    let (seconds, cpu_seconds) = usage.seconds();
+    let metadata = &report.metadata;
+    let json = BuildReport {
+        kind: "splats",
+        input: metadata.input,
+        options: &metadata.options,
+        nodes: metadata.nodes,
+        levels: metadata.levels,
+        leaves: metadata.leaves,
+        output_bytes: report.output_bytes,
+        seconds,
+        cpu_seconds,
+        peak_memory_bytes: usage.peak_memory_bytes(),
+        phases: report.phases.iter().map(|phase| PhaseReport { name: phase.name, seconds: phase.seconds }).collect(),
+    };
+    let text = format!(
+        "{}: {} triangles as {} splats on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
+        args.output.display(),
+        metadata.input.triangles,
+        metadata.leaves,
+        metadata.levels,
+        readable_bytes(report.output_bytes),
+        report.output_bytes as f64 / metadata.leaves as f64,
+    );
+    Ok(Outcome::new(&json, text))
+}
+
+/// Builds one model into one file, with progress.
+pub(crate) fn build(
+    input: &Path,
+    output: &Path,
+    options: &BuildOptions,
+    up: Option<UpAxis>,
+    console: &Console,
+) -> Result<Report, CliError> {
+    let stream = files::open_model(input)?;
+    let options = Options { memory_bytes: options.memory, threads: options.threads, up };
+    let work = console.work(&input.file_name().unwrap_or_default().to_string_lossy());
+    gigalod_build::splats::build(stream, &options, &work, output)
+        .map_err(|error| CliError::build(input, output, &error))
+}
+
+/// The input would be gone when the output takes its place.
+fn refuse_same_file(input: &Path, output: &Path) -> Result<(), CliError> {
+    match (input.canonicalize(), output.canonicalize()) {
+        (Ok(a), Ok(b)) if a == b => Err(CliError::in_file(output, "input and output are the same file")),
+        _ => Ok(()),
+    }
+}

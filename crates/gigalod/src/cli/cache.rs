@@ -1,0 +1,60 @@
+//! Raw models built on the way to a picture are kept in the user's cache, keyed by their contents and the build options.
+
+use super::args::BuildOptions;
+use super::build::build;
+use super::error::CliError;
+use super::files;
+use super::progress::Console;
+use gigalod_build::Progress;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// A `.glod` file for `file`: itself, or what it builds into.
+pub(crate) fn container_of(file: &Path, options: &BuildOptions, console: &Console) -> Result<PathBuf, CliError> {
+    if files::is_container(file)? {
+        return Ok(file.to_owned());
+    }
+    let folder = folder()?;
+    let name = format!("{}.glod", key(file, console)?);
+    let cached = folder.join(name);
+    if cached.is_file() && files::open_splats(&cached).is_ok() {
+        console.detail(|| format!("{}: built before as {}", file.display(), cached.display()));
+        return Ok(cached);
+    }
+    std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
+    build(file, &cached, options, None, console)?;
+    console.detail(|| format!("{}: built as {}", file.display(), cached.display()));
+    Ok(cached)
+}
+
+fn folder() -> Result<PathBuf, CliError> {
+    let variable = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let base = variable("XDG_CACHE_HOME")
+        .or_else(|| variable("HOME").map(|home| home.join(".cache")))
+        .or_else(|| variable("LOCALAPPDATA"));
+    base.map(|base| base.join("gigalod")).ok_or_else(|| {
+        CliError::new("no folder for the cache").hint("set XDG_CACHE_HOME, or use `gigalod build` first")
+    })
+}
+
+/// Depends on all bytes of the file and on the program's version; memory and threads do not change what is built.
+fn key(file: &Path, console: &Console) -> Result<String, CliError> {
+    let wrong = |error| CliError::in_file(file, error);
+    let mut source = files::open(file)?;
+    let total = source.metadata().map_err(wrong)?.len();
+    let work = console.work(&file.file_name().unwrap_or_default().to_string_lossy());
+    work.begin("read", total);
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(concat!("gigalod ", env!("CARGO_PKG_VERSION"), " splats\n").as_bytes());
+    let mut buffer = vec![0; 1 << 20];
+    let mut done = 0;
+    loop {
+        let read = source.read(&mut buffer).map_err(wrong)?;
+        if read == 0 {
+            return Ok(hasher.finalize().to_hex()[..32].to_string());
+        }
+        hasher.update(&buffer[..read]);
+        done += read as u64;
+        work.at(done);
+    }
+}

@@ -1,0 +1,111 @@
+//! What a command says when it is done, and when it cannot go on.
+
+use gigalod_build::BuildError;
+use gigalod_format::FormatError;
+use gigalod_import::ImportError;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+
+/// The end of a command that did what it was asked to.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    /// One object, on one line.
+    pub(crate) json: String,
+    /// For people; ends with a line end.
+    pub(crate) text: String,
+    /// False where the answer is no: `verify` found problems.
+    pub(crate) good: bool,
+}
+
+impl Outcome {
+    pub(crate) fn new(json: &impl Serialize, text: String) -> Self {
+        let json = serde_json::to_string(json).expect("reports are plain data");
+        Self { json, text, good: true }
+    }
+}
+
+/// One thing that is wrong: `error: FILE: what is wrong (where)`, and perhaps a hint.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct CliError {
+    file: Option<String>,
+    what: String,
+    place: Option<String>,
+    hint: Option<String>,
+    pub(crate) is_usage: bool,
+}
+
+impl CliError {
+    pub(crate) fn new(what: impl fmt::Display) -> Self {
+        Self { what: one_line(&what.to_string()), ..Self::default() }
+    }
+
+    pub(crate) fn in_file(file: &Path, what: impl fmt::Display) -> Self {
+        Self { file: Some(one_line(&file.display().to_string())), ..Self::new(what) }
+    }
+
+    /// The arguments are wrong in a way that the parser of arguments cannot see.
+    pub(crate) fn usage(what: impl fmt::Display) -> Self {
+        Self { is_usage: true, ..Self::new(what) }
+    }
+
+    pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    pub(crate) fn import(file: &Path, error: &ImportError) -> Self {
+        Self { place: error.place().map(ToString::to_string), ..Self::in_file(file, error.what()) }
+    }
+
+    pub(crate) fn format(file: &Path, error: &FormatError) -> Self {
+        Self::in_file(file, error)
+    }
+
+    pub(crate) fn build(input: &Path, output: &Path, error: &BuildError) -> Self {
+        match error {
+            BuildError::Import(error) => Self::import(input, error),
+            BuildError::Output(error) => Self::in_file(output, format!("could not write: {error}")),
+            BuildError::OverBudget { .. } => {
+                Self::in_file(input, error).hint("give a larger --memory, as --memory 8GiB")
+            }
+            BuildError::NoTriangles { .. } => {
+                Self::in_file(input, error).hint("point clouds without faces cannot be built yet")
+            }
+            error => Self::in_file(input, error),
+        }
+    }
+
+    /// `{"error":{"file","what","where"}}`.
+    pub(crate) fn to_json(&self) -> String {
+        #[derive(Serialize)]
+        struct Report<'a> {
+            file: Option<&'a str>,
+            what: &'a str,
+            r#where: Option<&'a str>,
+        }
+        let report = Report { file: self.file.as_deref(), what: &self.what, r#where: self.place.as_deref() };
+        serde_json::json!({ "error": report }).to_string()
+    }
+}
+
+impl fmt::Display for CliError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("error: ")?;
+        if let Some(file) = &self.file {
+            write!(f, "{file}: ")?;
+        }
+        f.write_str(&self.what)?;
+        if let Some(place) = &self.place {
+            write!(f, " ({place})")?;
+        }
+        if let Some(hint) = &self.hint {
+            write!(f, "\nhint: {hint}")?;
+        }
+        Ok(())
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,72 @@
+//! Opening and writing files.
+
+use super::error::CliError;
+use gigalod_format::splats::SplatFile;
+use gigalod_format::{Container, FileStore};
+use gigalod_import::{ByteSource, ModelStream};
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Opens a raw model.
+pub(crate) fn open_model(path: &Path) -> Result<Box<dyn ModelStream>, CliError> {
+    let file = open(path)?;
+    gigalod_import::open(Box::new(file) as Box<dyn ByteSource>).map_err(|error| CliError::import(path, &error))
+}
+
+/// Opens a `.glod` file.
+pub(crate) fn open_container(path: &Path) -> Result<Container, CliError> {
+    let store = FileStore::open(path).map_err(|error| CliError::in_file(path, error))?;
+    Container::open(Arc::new(store)).map_err(|error| CliError::format(path, &error))
+}
+
+/// Opens a `.glod` file of splats, the only kind there is.
+pub(crate) fn open_splats(path: &Path) -> Result<SplatFile, CliError> {
+    SplatFile::open(open_container(path)?).map_err(|error| CliError::format(path, &error))
+}
+
+/// True when the file begins as a `.glod` file does; anything else is taken for a raw model.
+pub(crate) fn is_container(path: &Path) -> Result<bool, CliError> {
+    let mut start = Vec::new();
+    open(path)?
+        .take(gigalod_format::MAGIC.len() as u64)
+        .read_to_end(&mut start)
+        .map_err(|error| CliError::in_file(path, error))?;
+    Ok(start == gigalod_format::MAGIC || path.extension().is_some_and(|extension| extension == "glod"))
+}
+
+/// Opens a regular file for reading.
+pub(crate) fn open(path: &Path) -> Result<File, CliError> {
+    let file = File::open(path).map_err(|error| CliError::in_file(path, error))?;
+    let is_file = file.metadata().map_err(|error| CliError::in_file(path, error))?.is_file();
+    if is_file { Ok(file) } else { Err(CliError::in_file(path, "not a regular file")) }
+}
+
+/// Writes a file that appears under its name only when `write` is done with it.
+pub(crate) fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    let wrong = |error: io::Error| CliError::in_file(path, format!("could not write: {error}"));
+    let output = gigalod_build::Output::create(path).map_err(wrong)?;
+    let mut buffered = io::BufWriter::with_capacity(1 << 20, output.file());
+    write(&mut buffered)?;
+    buffered.flush().map_err(wrong)?;
+    drop(buffered);
+    output.publish().map_err(wrong)
+}
+
+/// Writes an 8-bit sRGB picture with alpha.
+pub(crate) fn write_png(path: &Path, size: gigalod_geom::ImageSize, rgba: &[u8]) -> Result<(), CliError> {
+    write_atomically(path, |out| {
+        let mut encoder = png::Encoder::new(out, size.width, size.height);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let wrong = |error: png::EncodingError| CliError::in_file(path, format!("could not write: {error}"));
+        let mut writer = encoder.write_header().map_err(wrong)?;
+        writer.write_image_data(rgba).map_err(wrong)?;
+        writer.finish().map_err(wrong)
+    })
+}

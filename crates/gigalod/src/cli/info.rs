@@ -1,0 +1,79 @@
+//! `gigalod info`.
+
+use super::args::InfoArgs;
+use super::error::{CliError, Outcome};
+use super::files;
+use super::parse::readable_bytes;
+use super::progress::Console;
+use gigalod_format::{Bounds, InputCounts, LevelSummary};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// The JSON object of `info`.
+#[derive(Serialize)]
+struct InfoReport<'a> {
+    kind: &'a str,
+    version: u32,
+    input: InputCounts,
+    options: &'a BTreeMap<String, String>,
+    nodes: u64,
+    levels: u32,
+    leaves: u64,
+    bytes: u64,
+    raw_bytes: u64,
+    closed: bool,
+    bounds: Bounds,
+    attributes: &'a [String],
+    per_level: &'a [LevelSummary],
+}
+
+pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliError> {
+    let container = files::open_container(&args.file)?;
+    let metadata = container.read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
+    let bytes = container.store().len();
+    let json = InfoReport {
+        kind: container.kind().name(),
+        version: gigalod_format::VERSION,
+        input: metadata.input,
+        options: &metadata.options,
+        nodes: metadata.nodes,
+        levels: metadata.levels,
+        leaves: metadata.leaves,
+        bytes,
+        raw_bytes: metadata.raw_bytes,
+        closed: metadata.closed,
+        bounds: metadata.bounds,
+        attributes: &metadata.attributes,
+        per_level: &metadata.per_level,
+    };
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<12}{value}");
+    };
+    line("kind", format!("{} (format version {})", container.kind().name(), gigalod_format::VERSION));
+    line("built by", metadata.generator.clone());
+    line("input", format!("{} triangles, {} vertices", metadata.input.triangles, metadata.input.vertices));
+    for (name, value) in &metadata.options {
+        line("option", format!("{name} = {value}"));
+    }
+    let inner = metadata.nodes - metadata.leaves.min(metadata.nodes);
+    let branching = if inner == 0 { 0.0 } else { (metadata.nodes - 1) as f64 / inner as f64 };
+    line("nodes", format!("{} on {} levels, {branching:.2} children each", metadata.nodes, metadata.levels));
+    line("leaves", metadata.leaves.to_string());
+    let per_leaf = |bytes: u64| bytes as f64 / metadata.leaves.max(1) as f64;
+    line("size", format!("{} ({:.2} bytes a leaf)", readable_bytes(bytes), per_leaf(bytes)));
+    line(
+        "raw size",
+        format!("{} ({:.2} bytes a leaf)", readable_bytes(metadata.raw_bytes), per_leaf(metadata.raw_bytes)),
+    );
+    line("attributes", metadata.attributes.join(", "));
+    line("closed", if metadata.closed { "yes: backs are hidden" } else { "no: drawn from both sides" }.into());
+    let [min, max] = [metadata.bounds.min, metadata.bounds.max].map(|[x, y, z]| format!("{x} {y} {z}"));
+    line("bounds", format!("{min} to {max}"));
+    let _ = writeln!(text, "\n{:>5} {:>12} {:>12} {:>14}", "level", "nodes", "bytes", "max error");
+    for level in &metadata.per_level {
+        let _ = writeln!(text, "{:>5} {:>12} {:>12} {:>14.6e}", level.level, level.nodes, level.bytes, level.max_error);
+    }
+    Ok(Outcome::new(&json, text))
+}

@@ -1,0 +1,236 @@
+//! `gigalod render`.
+
+use super::args::{CameraArgs, KernelArg, RenderArgs};
+use super::cache;
+use super::error::{CliError, Outcome};
+use super::files;
+use super::path_file;
+use super::progress::Console;
+use gigalod_format::splats::SplatFile;
+use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
+use gigalod_geom::{Aabb, Camera, ImageSize};
+use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
+use gigalod_runtime::residency::ThreadedLoader;
+use gigalod_runtime::splats::Tint;
+use gigalod_runtime::{CutReport, Instance, Residency, Scene, Similarity, ViewId};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The JSON object of `render`.
+#[derive(Serialize)]
+struct RenderReport {
+    width: u32,
+    height: u32,
+    adapter: String,
+    threshold_px: f64,
+    /// Null where something reaches the eye itself.
+    max_error_px: Option<f64>,
+    converged: bool,
+    limited_by: Option<&'static str>,
+    drawn: Drawn,
+    culled: Culled,
+    bytes_read: u64,
+    cpu_bytes: u64,
+    gpu_bytes: u64,
+    select_ms: f64,
+    frame_ms: f64,
+    problems: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Drawn {
+    nodes: u64,
+    triangles: u64,
+    points: u64,
+    lines: u64,
+}
+
+#[derive(Serialize)]
+struct Culled {
+    frustum: u64,
+    backface: u64,
+}
+
+/// One picture to draw.
+pub(crate) struct Job<'a> {
+    pub(crate) camera: Camera,
+    pub(crate) threshold_px: f64,
+    pub(crate) look: Look,
+    pub(crate) tint: Tint,
+    pub(crate) output: &'a Path,
+    pub(crate) depth: Option<&'a Path>,
+}
+
+/// A model open for drawing.
+pub(crate) struct Stage {
+    scene: Scene,
+    renderer: Renderer,
+    up: UpAxis,
+}
+
+pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliError> {
+    let file = cache::container_of(&args.file, &args.build, console)?;
+    let mut stage = Stage::open(&file, args.cpu_budget)?;
+    let camera = camera(&args.camera, args.size, &stage.bounds(), stage.up)?;
+    let job = Job {
+        camera,
+        threshold_px: if args.full { 0.0 } else { args.error.unwrap_or(1.0) },
+        look: Look {
+            kernel: match args.kernel {
+                KernelArg::Square => Kernel::Square,
+                KernelArg::Round => Kernel::Round,
+            },
+            lighting: Lighting { towards_light: args.light, background: args.background },
+        },
+        tint: if args.lod_colors { Tint::Level } else { Tint::Model },
+        output: &args.output,
+        depth: args.depth.as_deref(),
+    };
+    stage.draw(&args.file, &job, console)
+}
+
+impl Stage {
+    /// Opens a `.glod` file and the graphics device.
+    pub(crate) fn open(file: &Path, cpu_budget: u64) -> Result<Self, CliError> {
+        let splats: SplatFile = files::open_splats(file)?;
+        let up = splats.skeleton().root().up;
+        let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get()).min(4);
+        let loader = ThreadedLoader::new(threads)
+            .map_err(|error| CliError::new(format!("could not start loading threads: {error}")))?;
+        let mut residency = Residency::new(cpu_budget, Box::new(loader));
+        let id = residency.add(Arc::new(splats));
+        let mut scene = Scene::new(residency);
+        scene.add(Instance { file: id, placement: Similarity::IDENTITY });
+        let renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
+        Ok(Self { scene, renderer, up })
+    }
+
+    /// Around the model.
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.scene.bounds()
+    }
+
+    /// Which way is up.
+    pub(crate) fn up(&self) -> UpAxis {
+        self.up
+    }
+
+    /// Draws one picture and writes it; `name` is what messages call the model.
+    pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
+        const CAMERA: ViewId = ViewId(0);
+        self.scene.splats_mut().tint = job.tint;
+        let threshold_px = job.threshold_px as f32;
+        self.scene.select_converged(CAMERA, &job.camera, threshold_px);
+        // Once more with everything there: the time that a warm cut takes.
+        let begun = Instant::now();
+        let report = self.scene.select(CAMERA, &job.camera, threshold_px);
+        let select_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let draws =
+            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
+        let frame = Frame { camera: job.camera, look: job.look, draws };
+        let picture = self.renderer.picture(&frame).map_err(graphics_error)?;
+        let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+
+        files::write_png(job.output, picture.size, &picture.rgba)?;
+        if let Some(depth) = job.depth {
+            write_depth(depth, &picture)?;
+        }
+        let residency = self.scene.residency();
+        let mut problems: Vec<String> = residency
+            .damaged()
+            .map(|(_, why)| CliError::in_file(name, why).to_string().replacen("error: ", "", 1))
+            .collect();
+        if report.inconsistent {
+            problems.push(format!("{}: the tree contradicts itself, parts may be missing", name.display()));
+        }
+        for problem in &problems {
+            console.warn(&CliError::new(problem));
+        }
+        let json = self.report(job, &report, select_ms, frame_ms, problems);
+        let limit = report.limited_by.map_or(String::new(), |limit| format!(", limited by {}", limit.name()));
+        let text = format!(
+            "{}: {} splats, largest error {:.2} px{limit}, in {frame_ms:.0} ms on {}\n",
+            job.output.display(),
+            report.drawn,
+            report.max_error_px,
+            self.renderer.gpu().adapter(),
+        );
+        Ok(Outcome::new(&json, text))
+    }
+
+    fn report(
+        &self,
+        job: &Job<'_>,
+        report: &CutReport,
+        select_ms: f64,
+        frame_ms: f64,
+        problems: Vec<String>,
+    ) -> RenderReport {
+        let residency = self.scene.residency();
+        let complete = !residency.is_full() && problems.is_empty();
+        RenderReport {
+            width: job.camera.size.width,
+            height: job.camera.size.height,
+            adapter: self.renderer.gpu().adapter(),
+            threshold_px: job.threshold_px,
+            max_error_px: report.max_error_px.is_finite().then_some(f64::from(report.max_error_px)),
+            converged: complete,
+            limited_by: report.limited_by.map(|limit| limit.name()),
+            drawn: Drawn { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
+            culled: Culled { frustum: report.culled_frustum, backface: report.culled_backface },
+            bytes_read: residency.bytes_read(),
+            cpu_bytes: residency.resident_bytes(),
+            gpu_bytes: self.renderer.gpu_bytes(),
+            select_ms,
+            frame_ms,
+            problems,
+        }
+    }
+}
+
+/// The camera that the options ask for.
+fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, up: UpAxis) -> Result<Camera, CliError> {
+    let fov_rad = |degrees: Option<f64>| degrees.unwrap_or(DEFAULT_FOV_DEG).to_radians();
+    if let (Some(eye), Some(target)) = (args.eye, args.target) {
+        return Ok(Camera::look_at(eye, target, args.up.unwrap_or(up.direction()), fov_rad(args.fov), size));
+    }
+    if let (Some(path), Some(frame)) = (&args.path, args.frame) {
+        let camera_path = path_file::read(path)?;
+        let count = camera_path.frames.len();
+        let pose = camera_path
+            .frames
+            .get(frame)
+            .ok_or_else(|| CliError::in_file(path, format!("no frame {frame}, expected 0 to {}", count - 1)))?;
+        let fov = fov_rad(args.fov.or(Some(camera_path.fov_deg)));
+        return Ok(Camera::look_at(pose.eye, pose.target, camera_path.up, fov, size));
+    }
+    let [azimuth, elevation, zoom] = args.orbit.unwrap_or([0.0, 0.0, 1.0]);
+    Ok(Camera::orbit(bounds, up, [azimuth, elevation], zoom, fov_rad(args.fov), size))
+}
+
+fn graphics_error(error: RenderError) -> CliError {
+    let error_line = CliError::new(&error);
+    match error {
+        RenderError::NoAdapter(_) => {
+            error_line.hint("install a Vulkan driver, as mesa-vulkan-drivers and libvulkan1 on Debian and Ubuntu")
+        }
+        _ => error_line,
+    }
+}
+
+fn write_depth(path: &Path, picture: &Picture) -> Result<(), CliError> {
+    use exr::prelude::*;
+    let size = (picture.size.width as usize, picture.size.height as usize);
+    let channel = AnyChannel::new("Z", FlatSamples::F32(picture.depth.clone()));
+    let image = Image::from_channels(size, AnyChannels::sort(SmallVec::from_vec(vec![channel])));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image
+        .write()
+        .to_buffered(&mut bytes)
+        .map_err(|error| CliError::in_file(path, format!("could not write: {error}")))?;
+    files::write_atomically(path, |out| {
+        out.write_all(bytes.get_ref()).map_err(|error| CliError::in_file(path, format!("could not write: {error}")))
+    })
+}

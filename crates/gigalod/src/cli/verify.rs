@@ -1,0 +1,116 @@
+//! `gigalod verify`.
+
+use super::args::VerifyArgs;
+use super::error::{CliError, Outcome};
+use super::files;
+use super::progress::Console;
+use gigalod::verify::{self, Measured, Problems};
+use gigalod_build::Progress;
+use gigalod_import::Batch;
+use gigalod_reference::Mesh;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::Path;
+
+/// The JSON object of `verify`.
+#[derive(Serialize)]
+struct VerifyReport<'a> {
+    ok: bool,
+    problems: &'a [String],
+    nodes_checked: u64,
+    measured: Option<MeasuredReport>,
+}
+
+#[derive(Serialize)]
+struct MeasuredReport {
+    hausdorff: f64,
+    rms: f64,
+    worst_ratio: f64,
+    violations: u64,
+}
+
+pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliError> {
+    let splats = files::open_splats(&args.file)?;
+    // The metadata is not needed for drawing, but it has a checksum too.
+    splats.container().read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
+    let name = args.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let work = console.work(&name);
+    work.begin("check", splats.skeleton().pages().len() as u64);
+    let (tree, mut problems) = verify::check(&splats, &mut |pages| work.at(pages));
+    let mut measured = None;
+    if let Some(original) = &args.against
+        && problems.count == 0
+    {
+        let mesh = read_mesh(original, &work)?;
+        work.begin("measure", 0);
+        let figures = verify::against(&tree, splats.skeleton().root().origin, &mesh);
+        judge(&figures, &mesh, splats.skeleton().root().leaves, &mut problems);
+        measured = Some(figures);
+    }
+    work.finish();
+
+    for problem in &problems.told {
+        console.warn(&CliError::in_file(&args.file, problem));
+    }
+    let ok = problems.count == 0;
+    let mut text = String::new();
+    let verdict = if ok { "sound".to_string() } else { format!("{} problems", problems.count) };
+    let _ = writeln!(text, "{}: {verdict}, {} nodes checked", args.file.display(), tree.nodes.len());
+    if let Some(Measured { hausdorff, rms, worst_ratio, violations }) = measured {
+        let _ = writeln!(
+            text,
+            "leaves against the original: largest distance {hausdorff:.4e}, rms {rms:.4e} (model units)\n\
+             all nodes: at most {worst_ratio:.4} of the stored error, {violations} violations"
+        );
+    }
+    let json = VerifyReport {
+        ok,
+        problems: &problems.told,
+        nodes_checked: tree.nodes.len() as u64,
+        measured: measured.map(|m| MeasuredReport {
+            hausdorff: m.hausdorff,
+            rms: m.rms,
+            worst_ratio: m.worst_ratio,
+            violations: m.violations,
+        }),
+    };
+    Ok(Outcome { good: ok, ..Outcome::new(&json, text) })
+}
+
+/// Turns figures that no sound file has into problems.
+fn judge(measured: &Measured, mesh: &Mesh, leaves: u64, problems: &mut Problems) {
+    if measured.violations > 0 {
+        let Measured { violations, worst_ratio, .. } = measured;
+        problems.count += violations;
+        problems
+            .told
+            .push(format!("{violations} violations of stored errors or enclosures, the worst ratio is {worst_ratio}"));
+    }
+    let mut referenced = vec![false; mesh.positions().len()];
+    for vertex in mesh.triangles().as_flattened() {
+        referenced[*vertex as usize] = true;
+    }
+    let referenced = referenced.iter().filter(|used| **used).count() as u64;
+    if referenced != leaves {
+        problems.count += 1;
+        problems.told.push(format!("{leaves} leaves, expected one for each of {referenced} referenced vertices"));
+    }
+}
+
+/// Reads a whole mesh into memory.
+fn read_mesh(path: &Path, work: &dyn Progress) -> Result<Mesh, CliError> {
+    let mut stream = files::open_model(path)?;
+    work.begin("read", stream.bytes_consumed().1);
+    let (mut positions, mut normals, mut colors, mut triangles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut batch = Batch::default();
+    while stream.next(&mut batch).map_err(|error| CliError::import(path, &error))? {
+        positions.append(&mut batch.vertices.positions);
+        normals.append(&mut batch.vertices.normals);
+        colors.append(&mut batch.vertices.colors);
+        triangles.append(&mut batch.triangles);
+        work.at(stream.bytes_consumed().0);
+    }
+    let attributes = stream.attributes();
+    Mesh::new(positions, attributes.normals.then_some(normals), attributes.colors.then_some(colors), triangles)
+        .map_err(|error| CliError::in_file(path, error))
+}

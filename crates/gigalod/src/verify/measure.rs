@@ -1,0 +1,123 @@
+//! The decoded spheres of a file against the mesh they stand for.
+//!
+//! * Each vertex' true sphere (largest bounding sphere of the triangles around it, computed here anew) must be enclosed by
+//!   every decoded sphere on some path from the root to a leaf.
+//! * Each sample of the surface must lie in some leaf's decoded sphere.
+//! * No point of a decoded sphere may be farther from the surface than the node's stored error, twice its radius.
+
+use super::structure::SplatTree;
+use gigalod_geom::sphere::triangle_bounding_radius;
+use gigalod_reference::{Bvh, Mesh};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Distances in model units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Largest distance found between the surface and the spheres drawn with `--full`, both ways.
+    pub hausdorff: f64,
+    /// Root mean square of the distances of points on those spheres from the surface.
+    pub rms: f64,
+    /// Largest ratio of a node's distance, bounded from above, to its stored error; at most 1 in a sound file.
+    pub worst_ratio: f64,
+    /// Vertices whose sphere is not enclosed, samples that are not covered, and nodes beyond their stored error.
+    pub violations: u64,
+}
+
+/// Points of a unit sphere at which leaves are measured.
+const DIRECTIONS: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+
+/// Measures. `origin` is that of the file's local space, in model space.
+pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> Measured {
+    let bvh = Bvh::build(mesh);
+    let enclosed = count_unenclosed_vertices(tree, origin, mesh);
+    let uncovered = count_uncovered_samples(tree, origin, mesh);
+
+    let per_node: Vec<NodeDistances> = tree
+        .nodes
+        .par_iter()
+        .map(|node| {
+            let center = origin + node.sphere.center.as_dvec3();
+            let radius = f64::from(node.sphere.radius);
+            let distance = |point: DVec3| bvh.nearest_point(point).map_or(f64::INFINITY, |nearest| nearest.distance);
+            // A point of the ball is at most a radius farther away than its centre.
+            let bound = distance(center) + radius;
+            let stored = 2.0 * radius;
+            // A node without a size stands for triangles without one, and lies on them.
+            let ratio = if bound > 0.0 { bound / stored } else { 0.0 };
+            let mut out = NodeDistances { ratio, ..Default::default() };
+            if node.children == 0 {
+                for direction in DIRECTIONS {
+                    let at = distance(center + direction.as_dvec3() * radius);
+                    out.farthest = out.farthest.max(at);
+                    out.squares += at * at;
+                }
+            }
+            out
+        })
+        .collect();
+    let leaves = tree.nodes.iter().filter(|node| node.children == 0).count().max(1);
+    // In order, so that the sum does not depend on the number of threads.
+    let squares: f64 = per_node.iter().map(|node| node.squares).sum();
+    let beyond = per_node.iter().filter(|node| node.ratio > 1.0 + 1e-6).count() as u64;
+    Measured {
+        hausdorff: per_node.iter().map(|node| node.farthest).fold(0.0, f64::max),
+        rms: (squares / (leaves * DIRECTIONS.len()) as f64).sqrt(),
+        worst_ratio: per_node.iter().map(|node| node.ratio).fold(0.0, f64::max),
+        violations: enclosed + uncovered + beyond,
+    }
+}
+
+#[derive(Clone, Copy, Default)]
+struct NodeDistances {
+    ratio: f64,
+    farthest: f64,
+    squares: f64,
+}
+
+/// Number of vertices whose true sphere no path of decoded spheres encloses.
+fn count_unenclosed_vertices(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
+    let mut radii = vec![-1.0_f64; mesh.positions().len()];
+    for triangle in mesh.triangles() {
+        let radius = triangle_bounding_radius(triangle.map(|vertex| mesh.positions()[vertex as usize]));
+        for vertex in triangle {
+            let known = &mut radii[*vertex as usize];
+            *known = known.max(radius);
+        }
+    }
+    let missing = |(vertex, radius): (usize, &f64)| {
+        *radius >= 0.0 && !has_enclosing_path(tree, mesh.positions()[vertex] - origin, *radius)
+    };
+    radii.par_iter().enumerate().filter(|(vertex, radius)| missing((*vertex, radius))).count() as u64
+}
+
+/// Number of surface samples (corners, middles of edges, barycentre of each triangle) outside all leaves.
+fn count_uncovered_samples(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
+    mesh.triangles()
+        .par_iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle.map(|vertex| mesh.positions()[vertex as usize] - origin);
+            let samples = [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5, (a + b + c) / 3.0];
+            // An edge's middle may lie on the very border of two spheres: leave rounding its due.
+            let slack = 1e-12 * (a.abs() + b.abs() + c.abs()).max_element();
+            samples.iter().filter(|sample| !has_enclosing_path(tree, **sample, -slack)).count() as u64
+        })
+        .sum()
+}
+
+/// True when a path from the root to a leaf encloses the ball all the way; local space.
+fn has_enclosing_path(tree: &SplatTree, center: DVec3, radius: f64) -> bool {
+    let mut stack = vec![0u32];
+    while let Some(index) = stack.pop() {
+        let node = &tree.nodes[index as usize];
+        let reach = f64::from(node.sphere.radius) - radius;
+        if reach < 0.0 || (node.sphere.center.as_dvec3() - center).length_squared() > reach * reach {
+            continue;
+        }
+        if node.children == 0 {
+            return true;
+        }
+        stack.extend(node.first_child..node.first_child + u32::from(node.children));
+    }
+    false
+}

@@ -1,0 +1,31 @@
+//! The judge of finished files: shares no code with the builders, and walks a file its own slow way.
+//!
+//! [`structure::check`] reads every byte and every tree bit; [`measure::against`] holds the decoded spheres against the
+//! original mesh.
+
+pub mod measure;
+pub mod structure;
+
+pub use measure::{Measured, against};
+pub use structure::{SplatTree, check};
+
+/// Problems beyond this many are counted, not told.
+pub const MOST_PROBLEMS: usize = 100;
+
+/// A list of problems that does not grow without bound.
+#[derive(Clone, Debug, Default)]
+pub struct Problems {
+    /// The first [`MOST_PROBLEMS`].
+    pub told: Vec<String>,
+    /// All of them.
+    pub count: u64,
+}
+
+impl Problems {
+    pub(crate) fn add(&mut self, problem: impl FnOnce() -> String) {
+        self.count += 1;
+        if self.told.len() < MOST_PROBLEMS {
+            self.told.push(problem());
+        }
+    }
+}

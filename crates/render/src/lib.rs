@@ -1,0 +1,23 @@
+//! Drawing with wgpu, one code path for every adapter.
+//!
+//! Draw sources go in, a picture comes out: draw sources → G-buffer (albedo, normal, depth) → lighting → picture. One WGSL
+//! file for each pass, in `shader/`; its host side is in the module of its name, and tests compare their layouts.
+//!
+//! What always holds: wgpu does not show through this crate's interface; a validation error is an error of the call that
+//! made it, never a black picture; only the baseline of WebGPU is needed.
+#![forbid(unsafe_code)]
+
+mod error;
+mod gbuffer;
+mod gpu;
+mod light;
+mod readback;
+mod renderer;
+mod shader;
+mod splats;
+
+pub use error::RenderError;
+pub use gpu::Gpu;
+pub use light::Lighting;
+pub use renderer::{Frame, Look, Picture, Renderer};
+pub use splats::Kernel;

@@ -1,0 +1,36 @@
+// light.wgsl: lights the G-buffer.
+//
+// Draw      one triangle that covers the picture.
+// Reads     params; albedo, normal and depth of the pixel.
+// Writes    the picture, in linear light; the target encodes it as sRGB.
+// Limits    none beyond the baseline of WebGPU.
+//
+// Lambert with an ambient share, from both sides: the normal is turned to the side that is seen.
+// CPU twin: `gigalod_reference::shade`.
+
+#import light_params.wgsl
+
+@group(0) @binding(0) var<uniform> params: LightParams;
+@group(0) @binding(1) var albedo_texture: texture_2d<f32>;
+@group(0) @binding(2) var normal_texture: texture_2d<f32>;
+@group(0) @binding(3) var depth_texture: texture_depth_2d;
+
+@vertex
+fn cover_picture(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(corner & 1u) * 4.0 - 1.0, f32(corner >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+@fragment
+fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    let pixel = vec2u(position.xy);
+    if textureLoad(depth_texture, pixel, 0) == 0.0 {
+        return params.background;
+    }
+    let from_middle = position.xy - params.size_px * 0.5;
+    let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) / params.focal_px;
+    let stored = textureLoad(normal_texture, pixel, 0).xyz;
+    let normal = normalize(select(stored, -stored, dot(stored, ray) > 0.0));
+    let direct = (1.0 - params.ambient) * max(dot(normal, params.towards_light.xyz), 0.0);
+    let albedo = textureLoad(albedo_texture, pixel, 0).rgb;
+    return vec4f(albedo * params.light.rgb * (params.ambient + direct), 1.0);
+}

@@ -1,0 +1,108 @@
+//! The seam between what is resident and what is drawn.
+
+use crate::residency::{FileId, PageRequest, Residency};
+use crate::splats::SplatDraw;
+use crate::{CutReport, InstanceId, ModelView, ViewId};
+use std::collections::VecDeque;
+
+/// What selector state is keyed by: one instance in one view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Target {
+    /// Which placement of a model.
+    pub instance: InstanceId,
+    /// Who looks at it.
+    pub view: ViewId,
+}
+
+/// What a selector decides from.
+#[derive(Clone, Copy)]
+pub struct SelectInput<'a> {
+    /// The hierarchy.
+    pub file: FileId,
+    /// The camera in the model's space.
+    pub view: ModelView,
+    /// Largest error on screen that is wanted, in pixels; 0 for everything there is.
+    pub threshold_px: f32,
+    /// What can be drawn now.
+    pub residency: &'a Residency,
+}
+
+/// A list that a device-side selector made; only the renderer that runs the selector knows what it names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DeviceDraw {
+    /// Chosen by the selector.
+    pub handle: u64,
+}
+
+/// What is to be drawn for one instance in one view.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum DrawSource {
+    /// A list of splats on the host.
+    Splats(Vec<SplatDraw>),
+    /// A list that already lies on the device.
+    OnDevice(DeviceDraw),
+}
+
+/// What a selector answers. Reused from frame to frame, so that a warm frame allocates nothing.
+#[derive(Debug)]
+pub struct Selection {
+    /// To draw now.
+    pub draw: DrawSource,
+    /// To load for later, in no order.
+    pub requests: Vec<PageRequest>,
+    /// Figures.
+    pub report: CutReport,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self { draw: DrawSource::Splats(Vec::new()), requests: Vec::new(), report: CutReport::default() }
+    }
+}
+
+/// Turns (hierarchy, instance, view, residency) into a draw source and page requests.
+pub trait Selector {
+    /// Overwrites `out`. State from earlier calls for the same `target` may be used, never that of another target.
+    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection);
+
+    /// Drops the state of a target that is gone.
+    fn forget(&mut self, target: Target);
+}
+
+/// The way back from the device: a ring of fixed size that a device-side selector writes requests into, and that the host
+/// reads when the device has finished that frame. What does not fit is dropped: the next frame asks again.
+#[derive(Clone, Debug)]
+pub struct RequestRing {
+    capacity: usize,
+    written: VecDeque<(u64, PageRequest)>,
+    dropped: u64,
+}
+
+impl RequestRing {
+    /// A ring of so many requests.
+    pub fn new(capacity: usize) -> Self {
+        Self { capacity, written: VecDeque::with_capacity(capacity), dropped: 0 }
+    }
+
+    /// Writes a request in frame `frame`.
+    pub fn push(&mut self, frame: u64, request: PageRequest) {
+        if self.written.len() == self.capacity {
+            self.dropped += 1;
+        } else {
+            self.written.push_back((frame, request));
+        }
+    }
+
+    /// Moves what was written up to and including `finished_frame` to `out`.
+    pub fn read_back(&mut self, finished_frame: u64, out: &mut Vec<PageRequest>) {
+        while self.written.front().is_some_and(|(frame, _)| *frame <= finished_frame) {
+            out.extend(self.written.pop_front().map(|(_, request)| request));
+        }
+    }
+
+    /// Requests that found the ring full, since it was made.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
