@@ -20,9 +20,6 @@ mod orientation;
 mod quantise;
 mod tree;
 
-#[cfg(test)]
-mod tests;
-
 use crate::output::Output;
 use crate::progress::{Phases, Progress, Report};
 use crate::{BuildError, Options};

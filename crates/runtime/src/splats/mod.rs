@@ -4,16 +4,12 @@
 
 mod traverse;
 
-#[cfg(test)]
-mod tests;
-
-pub use traverse::{CutSink, Cutting, VisitedNode, cut};
+pub use traverse::{Culled, CutSink, Cutting, VisitedNode, Work, cut};
 
 use crate::residency::{PageKey, PageRequest};
 use crate::selection::{DrawSource, SelectInput, Selection, Selector, Target};
 use gigalod_geom::color::rgb565_of_srgb8;
 use std::collections::BTreeMap;
-use traverse::Work;
 
 /// One splat, ready for the GPU. WGSL twin: `shader/splats.wgsl` of the render crate.
 #[repr(C)]

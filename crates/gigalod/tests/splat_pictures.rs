@@ -1,0 +1,71 @@
+//! Real scans as splats, beside the ray tracer: nothing may show through, and nothing may stick out.
+
+mod common;
+
+use common::{SIZE, built, draw, mesh, renderer, scan, scene, twelve_directions};
+use gigalod::geom::Camera;
+use gigalod::geom::camera::UpAxis;
+use gigalod::render::{Kernel, Lighting, Picture};
+use gigalod::runtime::splats::MATERIAL_SRGB;
+use gigalod_reference::judge::{Drawn, judge};
+use gigalod_reference::raytrace::supersampled_coverage;
+use gigalod_reference::{Bvh, Shading, Truth, metrics, shade};
+
+fn rgb(picture: &Picture) -> gigalod_reference::Picture {
+    let pixels = picture.rgba.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
+    gigalod_reference::Picture { size: picture.size, pixels }
+}
+
+fn has_no_holes_and_no_fat(model: &str) {
+    let (Some(path), Some(mut renderer)) = (scan(model), renderer()) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = scene(built(&path, folder.path()));
+    let mesh = mesh(&path);
+    let bvh = Bvh::build(&mesh);
+    let mut psnr = [vec![], vec![]];
+    for orbit_deg in twelve_directions() {
+        let camera = Camera::orbit(&mesh.bounds(), UpAxis::Y, orbit_deg, 1.0, 40f64.to_radians(), SIZE);
+        let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
+        let touched = supersampled_coverage(&bvh, &camera, 4);
+        let shading = Shading {
+            to_light: camera.shoulder_light(),
+            background_srgb: Lighting::default().background,
+            plain_albedo_srgb: MATERIAL_SRGB,
+        };
+        let expected = shade::picture(&truth, &shading);
+        let mask = metrics::silhouette_mask(&truth);
+        for (kernel, psnr) in [Kernel::Square, Kernel::Round].into_iter().zip(&mut psnr) {
+            let (report, picture) = draw(&mut scene, &mut renderer, &camera, 1.0, kernel);
+            let limited = report.limited_by.is_some().then_some(&picture.footprint_px[..]);
+            let verdict = judge(&truth, &touched, &Drawn { depth: &picture.depth, data_footprint_px: limited }, 1.0);
+            assert!(
+                verdict.holes.is_empty() && verdict.fat.is_empty(),
+                "{model} from {orbit_deg:?}, {kernel:?}: {} holes, {} fat, first {:?} {:?}",
+                verdict.holes.len(),
+                verdict.fat.len(),
+                verdict.holes.first(),
+                verdict.fat.first(),
+            );
+            assert!(verdict.judged.count() > 1000, "something was judged");
+            psnr.extend(metrics::psnr_db(&expected, &rgb(&picture), Some(&mask)));
+        }
+    }
+    let [square, round] = psnr.map(|all| all.iter().sum::<f64>() / all.len() as f64);
+    println!("{model}: mean PSNR to the ray tracer {square:.2} dB (square), {round:.2} dB (round)");
+    assert!(round > 15.0, "the picture is recognisable");
+}
+
+#[test]
+fn dragon_has_no_holes_and_no_fat_from_twelve_sides() {
+    has_no_holes_and_no_fat("dragon_vrip.ply.gz");
+}
+
+#[test]
+fn bunny_has_no_holes_and_no_fat_from_twelve_sides() {
+    has_no_holes_and_no_fat("bun_zipper.ply");
+}
+
+#[test]
+fn laurana_has_no_holes_and_no_fat_from_twelve_sides() {
+    has_no_holes_and_no_fat("laurana.ply");
+}
