@@ -1,1 +1,37 @@
-fn main() {}
+//! Everything a developer does, in one place: `cargo xtask help`.
+//!
+//! Needs the Rust toolchain and nothing else: what is missing is installed where that is possible, and named where it is not.
+#![forbid(unsafe_code)]
+
+mod setup;
+mod steps;
+
+use anyhow::{Result, bail};
+
+const HELP: &str = "\
+cargo xtask COMMAND
+
+  demo [ARGS]   make a statue of 2 million triangles, build it, draw four pictures into ./demo
+  test          everything CI runs: format, lints, documentation, tests, shaders, web build
+  setup         install what demo and test need (they do it by themselves)
+
+Environment of `test`:
+  GIGALOD_DATA  folder of real models; tests that want them are skipped without it
+  REQUIRE_GPU   set: a test that finds no graphics adapter fails instead of being skipped
+";
+
+fn main() -> Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let rest: Vec<String> = arguments.collect();
+    match command.as_str() {
+        "setup" => setup::everything(),
+        "demo" => steps::demo(&rest),
+        "test" if rest.is_empty() => steps::test(),
+        "" | "help" | "-h" | "--help" => {
+            print!("{HELP}");
+            Ok(())
+        }
+        _ => bail!("unknown command: {command} {}\n\n{HELP}", rest.join(" ")),
+    }
+}
