@@ -4,7 +4,7 @@ use gigalod_geom::ImageSize;
 
 /// sRGB-encoded, alpha 1 where there is a surface.
 pub(crate) const ALBEDO: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-/// World space; w holds the diameter in pixels of what was drawn there.
+/// World space; w holds the extent in pixels of what was drawn there.
 pub(crate) const NORMAL: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// near / z: 1 at the near plane, 0 at infinity and for background. As a float this has the same relative precision at all
 /// distances, and unlike a 32-bit colour target it can be drawn to on every adapter; z is `near / depth`.

@@ -37,7 +37,7 @@ pub struct Picture {
     pub rgba: Vec<u8>,
     /// Distance along the view axis, world units; `+inf` for background.
     pub depth: Vec<f32>,
-    /// Diameter in pixels of the splat that was drawn; 0 for background.
+    /// Largest distance in pixels between two points of the splat that was drawn; 0 for background.
     pub footprint_px: Vec<f32>,
 }
 
@@ -167,8 +167,9 @@ fn cleared(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
     }
 }
 
-/// How close to the eye something may come before it counts as being there: a 2²⁰th of the distance to the farthest thing
-/// drawn. The depth buffer has the same precision whatever this is.
+/// How close to the eye something may come before it counts as being there: about a 2²⁰th of the distance to the farthest
+/// thing drawn. The depth buffer has the same precision whatever this is; and as it is a power of two, depths round the same
+/// way whatever it is, so what else is drawn makes no difference to a pixel.
 fn near_plane(frame: &Frame<'_>) -> f64 {
     let farthest = frame.draws.iter().map(|(placement, source)| match source {
         DrawSource::Splats(splats) => {
@@ -180,8 +181,13 @@ fn near_plane(frame: &Frame<'_>) -> f64 {
     });
     match farthest.fold(0.0, f64::max) {
         0.0 => 1.0,
-        farthest => farthest / f64::from(1 << 20),
+        farthest => power_of_two_below(farthest) / f64::from(1 << 20),
     }
+}
+
+fn power_of_two_below(value: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff << 52;
+    f64::from_bits(value.to_bits() & EXPONENT)
 }
 
 /// IEEE 754 half to single precision; finite and positive numbers are all that is stored here.

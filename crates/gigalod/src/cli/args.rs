@@ -58,7 +58,7 @@ pub(crate) struct BuildOptions {
     #[arg(long, default_value = "2GiB", value_parser = parse::memory, value_name = "SIZE")]
     pub(crate) memory: u64,
     /// Worker threads [default: one for each core]
-    #[arg(long, default_value_t = 0, hide_default_value = true, value_name = "N")]
+    #[arg(long, default_value = "0", hide_default_value = true, value_parser = parse::threads, value_name = "N")]
     pub(crate) threads: usize,
 }
 
@@ -249,7 +249,7 @@ pub(crate) struct PathArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) around: PathBuf,
     /// Length in seconds, 30 poses each
-    #[arg(long, default_value_t = 10.0, value_parser = parse::positive, value_name = "SECONDS")]
+    #[arg(long, default_value = "10", value_parser = parse::seconds, value_name = "SECONDS")]
     pub(crate) seconds: f64,
     /// Another seed, another path
     #[arg(long, default_value_t = 1, value_name = "S")]

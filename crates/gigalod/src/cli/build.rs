@@ -40,7 +40,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         return Err(CliError::usage(format!("{} inputs, expected one", args.inputs.len()))
             .hint("several files as one model are not supported yet"));
     };
-    refuse_same_file(input, &args.output)?;
+    files::check_output(&args.output, &[input])?;
     let usage = Usage::watch();
     let report = build(input, &args.output, &args.options, None, console)?;
     let (seconds, cpu_seconds) = usage.seconds();
@@ -83,12 +83,4 @@ pub(crate) fn build(
     let work = console.work(&input.file_name().unwrap_or_default().to_string_lossy());
     gigalod_build::splats::build(stream, &options, &work, output)
         .map_err(|error| CliError::build(input, output, &error))
-}
-
-/// The input would be gone when the output takes its place.
-fn refuse_same_file(input: &Path, output: &Path) -> Result<(), CliError> {
-    match (input.canonicalize(), output.canonicalize()) {
-        (Ok(a), Ok(b)) if a == b => Err(CliError::in_file(output, "input and output are the same file")),
-        _ => Ok(()),
-    }
 }

@@ -44,12 +44,20 @@ pub(crate) fn run(args: &CompareArgs, _console: &Console) -> Result<Outcome, Cli
     Ok(Outcome::new(&json, text))
 }
 
+/// What `render` can write; a few bytes may claim to be far more.
+const MOST_PIXELS: u32 = 16384;
+
 /// Any PNG, as 8-bit sRGB; what is transparent is not seen through.
 fn read_png(path: &Path) -> Result<Picture, CliError> {
     let wrong = |error: png::DecodingError| CliError::in_file(path, error);
     let mut decoder = png::Decoder::new(BufReader::new(files::open(path)?));
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info().map_err(wrong)?;
+    let (width, height) = reader.info().size();
+    if width.max(height) > MOST_PIXELS {
+        let what = format!("a picture of {width}x{height} pixels, expected 1 to {MOST_PIXELS} each way");
+        return Err(CliError::in_file(path, what));
+    }
     let bytes = reader.output_buffer_size().ok_or_else(|| CliError::in_file(path, "too large a picture"))?;
     let mut buffer = vec![0; bytes];
     let frame = reader.next_frame(&mut buffer).map_err(wrong)?;

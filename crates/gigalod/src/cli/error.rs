@@ -4,8 +4,8 @@ use gigalod_build::BuildError;
 use gigalod_format::FormatError;
 use gigalod_import::ImportError;
 use serde::Serialize;
-use std::fmt;
 use std::path::Path;
+use std::{fmt, io};
 
 /// The end of a command that did what it was asked to.
 #[derive(Debug)]
@@ -44,6 +44,16 @@ impl CliError {
         Self { file: Some(one_line(&file.display().to_string())), ..Self::new(what) }
     }
 
+    /// A file could not be written, or not completely.
+    pub(crate) fn write(file: &Path, error: &io::Error) -> Self {
+        // The system's own words would name a temporary file that nobody asked for.
+        match error.kind() {
+            io::ErrorKind::NotFound => Self::in_file(file, "could not write: the folder does not exist"),
+            io::ErrorKind::PermissionDenied => Self::in_file(file, "could not write: permission denied"),
+            _ => Self::in_file(file, format!("could not write: {error}")),
+        }
+    }
+
     /// The arguments are wrong in a way that the parser of arguments cannot see.
     pub(crate) fn usage(what: impl fmt::Display) -> Self {
         Self { is_usage: true, ..Self::new(what) }
@@ -65,7 +75,7 @@ impl CliError {
     pub(crate) fn build(input: &Path, output: &Path, error: &BuildError) -> Self {
         match error {
             BuildError::Import(error) => Self::import(input, error),
-            BuildError::Output(error) => Self::in_file(output, format!("could not write: {error}")),
+            BuildError::Output(error) => Self::write(output, error),
             BuildError::OverBudget { .. } => {
                 Self::in_file(input, error).hint("give a larger --memory, as --memory 8GiB")
             }

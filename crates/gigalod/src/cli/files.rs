@@ -17,6 +17,7 @@ pub(crate) fn open_model(path: &Path) -> Result<Box<dyn ModelStream>, CliError> 
 
 /// Opens a `.glod` file.
 pub(crate) fn open_container(path: &Path) -> Result<Container, CliError> {
+    expect_regular(path)?;
     let store = FileStore::open(path).map_err(|error| CliError::in_file(path, error))?;
     Container::open(Arc::new(store)).map_err(|error| CliError::format(path, &error))
 }
@@ -38,9 +39,28 @@ pub(crate) fn is_container(path: &Path) -> Result<bool, CliError> {
 
 /// Opens a regular file for reading.
 pub(crate) fn open(path: &Path) -> Result<File, CliError> {
-    let file = File::open(path).map_err(|error| CliError::in_file(path, error))?;
-    let is_file = file.metadata().map_err(|error| CliError::in_file(path, error))?.is_file();
-    if is_file { Ok(file) } else { Err(CliError::in_file(path, "not a regular file")) }
+    expect_regular(path)?;
+    File::open(path).map_err(|error| CliError::in_file(path, error))
+}
+
+/// Asked before a file is opened: to open a pipe that nobody writes to would never end.
+fn expect_regular(path: &Path) -> Result<(), CliError> {
+    let is_file = std::fs::metadata(path).map_err(|error| CliError::in_file(path, error))?.is_file();
+    if is_file { Ok(()) } else { Err(CliError::in_file(path, "not a regular file")) }
+}
+
+/// Refuses an output that would take the place of one of `inputs`, or of a device or pipe. Folders are refused when it comes
+/// to writing.
+pub(crate) fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), CliError> {
+    let Ok(metadata) = std::fs::metadata(output) else { return Ok(()) };
+    if !metadata.is_file() && !metadata.is_dir() {
+        return Err(CliError::in_file(output, "not a regular file: it would be replaced"));
+    }
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    if inputs.iter().any(|input| same(input, output)) {
+        return Err(CliError::in_file(output, "input and output are the same file"));
+    }
+    Ok(())
 }
 
 /// Writes a file that appears under its name only when `write` is done with it.
@@ -48,7 +68,7 @@ pub(crate) fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> Result<(), CliError>,
 ) -> Result<(), CliError> {
-    let wrong = |error: io::Error| CliError::in_file(path, format!("could not write: {error}"));
+    let wrong = |error: io::Error| CliError::write(path, &error);
     let output = gigalod_build::Output::create(path).map_err(wrong)?;
     let mut buffered = io::BufWriter::with_capacity(1 << 20, output.file());
     write(&mut buffered)?;

@@ -29,7 +29,9 @@ struct InfoReport<'a> {
 }
 
 pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliError> {
-    let container = files::open_container(&args.file)?;
+    // The skeleton tells nothing here, but where it is damaged the file is no good.
+    let splats = files::open_splats(&args.file)?;
+    let container = splats.container();
     let metadata = container.read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
     let bytes = container.store().len();
     let json = InfoReport {

@@ -19,6 +19,8 @@ mod verify;
 use args::{Cli, Command};
 use clap::Parser;
 use error::{CliError, Outcome};
+use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Runs the program.
@@ -29,8 +31,10 @@ pub(crate) fn run() -> ExitCode {
         Err(error) => {
             let failed = error.use_stderr();
             if failed && json_asked_for {
-                let what = error.to_string().lines().next().unwrap_or_default().replace("error: ", "");
-                println!("{}", CliError::new(what).to_json());
+                // What is wrong stands in the first paragraph; hints and usage follow.
+                let text = error.to_string();
+                let what = text.split("\n\n").next().unwrap_or_default();
+                let _ = say(&format!("{}\n", CliError::new(what.trim_start_matches("error: ")).to_json()));
             }
             // Help and version go to standard output, what was wrong to standard error. A closed pipe is not our problem.
             let _ = error.print();
@@ -49,19 +53,27 @@ pub(crate) fn run() -> ExitCode {
     };
     match outcome {
         Ok(Outcome { json, text, good }) => {
-            if cli.json {
-                println!("{json}");
-            } else {
-                print!("{text}");
+            let said = say(&if cli.json { json + "\n" } else { text });
+            if let Err(error) = &said {
+                console.line(&CliError::write(Path::new("standard output"), error));
             }
-            ExitCode::from(if good { 0 } else { 1 })
+            ExitCode::from(if good && said.is_ok() { 0 } else { 1 })
         }
         Err(error) => {
             if cli.json {
-                println!("{}", error.to_json());
+                let _ = say(&format!("{}\n", error.to_json()));
             }
-            eprintln!("{error}");
+            console.line(&error);
             ExitCode::from(if error.is_usage { 2 } else { 1 })
         }
+    }
+}
+
+/// Writes to standard output. A reader that has read enough is no error.
+fn say(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
     }
 }

@@ -95,6 +95,22 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Length of a camera path.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    match positive(text)? {
+        seconds if seconds <= 3600.0 => Ok(seconds),
+        _ => Err("expected at most an hour, 3600".into()),
+    }
+}
+
+/// A number of threads; 0 is one for each core.
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(threads) if threads <= 1024 => Ok(threads),
+        _ => Err(format!("'{text}', expected a whole number, at most 1024")),
+    }
+}
+
 pub(crate) fn fov(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(degrees) if degrees > 0.0 && degrees < 180.0 => Ok(degrees),

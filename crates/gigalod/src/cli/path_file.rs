@@ -72,8 +72,6 @@ pub(crate) fn write(path: &Path, camera_path: &CameraPath) -> Result<u64, CliErr
             .collect(),
     };
     let text = serde_json::to_string(&file).expect("numbers of a path are finite");
-    files::write_atomically(path, |out| {
-        out.write_all(text.as_bytes()).map_err(|error| CliError::in_file(path, format!("could not write: {error}")))
-    })?;
+    files::write_atomically(path, |out| out.write_all(text.as_bytes()).map_err(|error| CliError::write(path, &error)))?;
     Ok(text.len() as u64)
 }

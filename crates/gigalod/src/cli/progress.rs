@@ -3,7 +3,8 @@
 use super::error::CliError;
 use gigalod_build::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::fmt::Display;
+use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -22,15 +23,20 @@ impl Console {
         Self { verbose, on_terminal: std::io::stderr().is_terminal() }
     }
 
+    /// A line on standard error. Where nobody can be told, work goes on all the same.
+    pub(crate) fn line(&self, text: impl Display) {
+        let _ = writeln!(std::io::stderr(), "{text}");
+    }
+
     /// Something is not as it should be, but work goes on.
     pub(crate) fn warn(&self, what: &CliError) {
-        eprintln!("{}", what.to_string().replacen("error:", "warning:", 1));
+        self.line(what.to_string().replacen("error:", "warning:", 1));
     }
 
     /// Said with `-v`.
     pub(crate) fn detail(&self, text: impl FnOnce() -> String) {
         if self.verbose {
-            eprintln!("{}", text());
+            self.line(text());
         }
     }
 
@@ -102,7 +108,7 @@ impl Progress for Work<'_> {
             phase.last_line = Instant::now();
             let percent = done.saturating_mul(100) / phase.total;
             let left = phase.bar.eta().as_secs();
-            eprintln!("{}: {} {percent} %, {left} s left", self.name, phase.name);
+            self.console.line(format_args!("{}: {} {percent} %, {left} s left", self.name, phase.name));
         }
     }
 }

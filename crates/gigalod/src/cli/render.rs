@@ -71,6 +71,14 @@ pub(crate) struct Stage {
 }
 
 pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliError> {
+    if args.depth.as_ref() == Some(&args.output) {
+        return Err(CliError::usage("the picture and its depth in one file, expected two"));
+    }
+    let inputs: Vec<&Path> =
+        [Some(&args.file), args.camera.path.as_ref()].into_iter().flatten().map(AsRef::as_ref).collect();
+    for output in [Some(&args.output), args.depth.as_ref()].into_iter().flatten() {
+        files::check_output(output, &inputs)?;
+    }
     let file = cache::container_of(&args.file, &args.build, console)?;
     let mut stage = Stage::open(&file, args.cpu_budget)?;
     let camera = camera(&args.camera, args.size, &stage.bounds(), stage.up)?;
@@ -230,7 +238,5 @@ fn write_depth(path: &Path, picture: &Picture) -> Result<(), CliError> {
         .write()
         .to_buffered(&mut bytes)
         .map_err(|error| CliError::in_file(path, format!("could not write: {error}")))?;
-    files::write_atomically(path, |out| {
-        out.write_all(bytes.get_ref()).map_err(|error| CliError::in_file(path, format!("could not write: {error}")))
-    })
+    files::write_atomically(path, |out| out.write_all(bytes.get_ref()).map_err(|error| CliError::write(path, &error)))
 }

@@ -62,6 +62,7 @@ impl From<OrderArg> for Order {
 }
 
 fn statue(args: &StatueArgs, console: &Console) -> Result<Written, CliError> {
+    files::check_output(&args.output, &[])?;
     let options =
         StatueOptions { triangles: args.triangles, seed: args.seed, colors: args.colors, order: args.order.into() };
     write_statue(&args.output, &options, console)
@@ -73,6 +74,7 @@ pub(crate) fn write_statue(path: &Path, options: &StatueOptions, console: &Conso
 }
 
 fn replicate(args: &ReplicateArgs, console: &Console) -> Result<Written, CliError> {
+    files::check_output(&args.output, &[&args.scan])?;
     let scan = read_scan(&args.scan)?;
     let options = ReplicaOptions { triangles: args.triangles, seed: args.seed, order: args.order.into() };
     generate(&args.output, console, |out, progress| write_replicas(&scan, options, out, progress))
@@ -98,7 +100,7 @@ fn generate(
     let mut written = None;
     files::write_atomically(path, |out| {
         written = Some(make(out, &mut progress).map_err(|error| match error {
-            SynthError::Io { source } => CliError::in_file(path, format!("could not write: {source}")),
+            SynthError::Io { source } => CliError::write(path, &source),
             error => CliError::in_file(path, error),
         })?);
         Ok(())
@@ -121,6 +123,7 @@ fn read_scan(path: &Path) -> Result<Scan, CliError> {
 }
 
 fn path(args: &PathArgs) -> Result<(u64, usize), CliError> {
+    files::check_output(&args.output, &[&args.around])?;
     let splats = files::open_splats(&args.around)?;
     let root = splats.skeleton().root();
     let kind = match args.kind {

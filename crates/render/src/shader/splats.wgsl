@@ -2,7 +2,7 @@
 //
 // Draw      one instance a splat, 4 vertices each (a triangle strip).
 // Reads     params; the instance's `SplatDraw`.
-// Writes    albedo (sRGB; alpha 1), normal (world; w = diameter of the splat in pixels), depth (near / z: 1 at the near
+// Writes    albedo (sRGB; alpha 1), normal (world; w = largest distance between two of its pixels), depth (near / z: 1 at the near
 //           plane, 0 at infinity).
 // Limits    none beyond the baseline of WebGPU.
 //
@@ -55,7 +55,9 @@ fn place(@builtin(vertex_index) corner: u32, splat: Splat) -> Corner {
         let to_ndc = 2.0 / params.size_px;
         middle_ndc = f * c.z * c.xy / gap * to_ndc;
         half_ndc = (half_px + SLACK_PX) * to_ndc;
-        diameter_px = min(half_px * 2.0, diameter_px);
+        // A square's diagonal is √2 times its side.
+        let across_px = half_px * select(2.0, 2.828427, params.kernel == KERNEL_SQUARE);
+        diameter_px = min(across_px, diameter_px);
     }
 
     var out: Corner;
@@ -90,8 +92,10 @@ fn cover(in: Corner) -> Surface {
         discard;
     }
     // Nearest point of the ball on the ray; outside the ball, in a square's corners, the depth of the nearest point to it.
-    let z = c.z - (along + sqrt(max(r * r - apart_squared, 0.0) * stretch)) / stretch;
-    if params.kernel == KERNEL_ROUND && c.z + r <= params.near {
+    let half_chord = sqrt(max(r * r - apart_squared, 0.0) * stretch);
+    let z = c.z - (along + half_chord) / stretch;
+    // Behind the eye: the ray meets the ball only where it does not go.
+    if c.z - (along - half_chord) / stretch <= params.near {
         discard;
     }
 
