@@ -12,15 +12,55 @@ use gigalod_geom::{Camera, ImageSize};
 use gigalod_render::Look;
 use gigalod_runtime::splats::Tint;
 use gigalod_synth::{Order, StatueOptions};
+use glam::DVec3;
 use std::fmt::Write;
 use std::time::Instant;
 
-/// A picture of the demo: file, what it shows, orbit, threshold in pixels, colours.
-const PICTURES: [(&str, &str, [f64; 3], f64, Tint); 4] = [
-    ("1-whole.png", "the whole statue, error 1 px", [25.0, 8.0, 1.0], 1.0, Tint::Model),
-    ("2-face.png", "the face, error 1 px", [20.0, 5.0, 3.5], 1.0, Tint::Model),
-    ("3-surface.png", "its surface, as fine as the data", [35.0, 12.0, 12.0], 1.0, Tint::Model),
-    ("4-levels.png", "levels of detail by colour, error 6 px", [25.0, 8.0, 1.3], 6.0, Tint::Level),
+/// A picture of the demo.
+struct Shot {
+    file: &'static str,
+    shows: &'static str,
+    /// What the camera looks at, in halves of the bounds' size from their middle.
+    at: DVec3,
+    /// Azimuth and elevation in degrees, and how many times nearer than a view of the whole.
+    orbit: [f64; 3],
+    threshold_px: f64,
+    tint: Tint,
+}
+
+const SHOTS: [Shot; 4] = [
+    Shot {
+        file: "1-whole.png",
+        shows: "the whole statue, error 1 px",
+        at: DVec3::ZERO,
+        orbit: [25.0, 6.0, 1.15],
+        threshold_px: 1.0,
+        tint: Tint::Model,
+    },
+    Shot {
+        file: "2-face.png",
+        shows: "the face, error 1 px",
+        at: DVec3::new(0.0, 0.5, 0.3),
+        orbit: [32.0, 4.0, 2.6],
+        threshold_px: 1.0,
+        tint: Tint::Model,
+    },
+    Shot {
+        file: "3-eye.png",
+        shows: "an eye, as fine as the data",
+        at: DVec3::new(0.14, 0.53, 0.55),
+        orbit: [20.0, 8.0, 8.0],
+        threshold_px: 1.0,
+        tint: Tint::Model,
+    },
+    Shot {
+        file: "4-levels.png",
+        shows: "levels of detail by colour, error 6 px",
+        at: DVec3::new(0.0, 0.25, 0.2),
+        orbit: [25.0, 20.0, 1.6],
+        threshold_px: 6.0,
+        tint: Tint::Level,
+    },
 ];
 
 pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliError> {
@@ -41,13 +81,17 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliErro
 
     let mut stage = Stage::open(&built, 1 << 30)?;
     let size = ImageSize { width: 1280, height: 720 };
-    for (name, shows, [azimuth, elevation, zoom], threshold_px, tint) in PICTURES {
-        let picture = folder.join(name);
+    for shot in &SHOTS {
+        let picture = folder.join(shot.file);
+        let bounds = stage.bounds();
+        let [azimuth, elevation, zoom] = shot.orbit;
         let fov = DEFAULT_FOV_DEG.to_radians();
-        let camera = Camera::orbit(&stage.bounds(), stage.up(), [azimuth, elevation], zoom, fov, size);
-        let job = Job { camera, threshold_px, look: Look::default(), tint, output: &picture, depth: None };
+        let mut camera = Camera::orbit(&bounds, stage.up(), [azimuth, elevation], zoom, fov, size);
+        camera.eye += bounds.extent() * 0.5 * shot.at;
+        let look = Look::default();
+        let job = Job { camera, threshold_px: shot.threshold_px, look, tint: shot.tint, output: &picture, depth: None };
         let drawn = stage.draw(&built, &job, console)?;
-        let _ = write!(text, "{shows}: {}", drawn.text);
+        let _ = write!(text, "{}: {}", shot.shows, drawn.text);
     }
     let _ = write!(
         text,

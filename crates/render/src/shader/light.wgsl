@@ -5,7 +5,9 @@
 // Writes    the picture, in linear light; the target encodes it as sRGB.
 // Limits    none beyond the baseline of WebGPU.
 //
-// Lambert with an ambient share, from both sides: the normal is turned to the side that is seen.
+// Lambert with an ambient share, from both sides: the normal is turned to the side that is seen. A normal that points away by
+// less than GRAZING is left alone: there is no telling a back from a front whose smooth normal leans over the horizon, and
+// fronts are what silhouettes are made of; turned, they would be lit from the wrong side.
 // CPU twin: `gigalod_reference::shade`.
 
 #import light_params.wgsl
@@ -14,6 +16,9 @@
 @group(0) @binding(1) var albedo_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 @group(0) @binding(3) var depth_texture: texture_depth_2d;
+
+// Sine of the angle beyond the horizon, about 14°.
+const GRAZING: f32 = 0.25;
 
 @vertex
 fn cover_picture(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
@@ -29,7 +34,8 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let from_middle = position.xy - params.size_px * 0.5;
     let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) / params.focal_px;
     let stored = textureLoad(normal_texture, pixel, 0).xyz;
-    let normal = normalize(select(stored, -stored, dot(stored, ray) > 0.0));
+    let away = dot(stored, ray) > GRAZING * length(ray) * length(stored);
+    let normal = normalize(select(stored, -stored, away));
     let direct = (1.0 - params.ambient) * max(dot(normal, params.towards_light.xyz), 0.0);
     let albedo = textureLoad(albedo_texture, pixel, 0).rgb;
     return vec4f(albedo * params.light.rgb * (params.ambient + direct), 1.0);
