@@ -1,0 +1,101 @@
+//! Draws a model as splats beside what a ray tracer sees of it, and their difference.
+//!
+//! `cargo run --release --example beside_truth -- MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX]]`
+//!
+//! Left: splats. Middle: the ray tracer. Right: their difference, four times enlarged; holes red, fat green. Prints the judge's
+//! counts and the image metrics.
+
+use anyhow::{Context, Result};
+use gigalod::build::{NoProgress, Options, splats};
+use gigalod::format::splats::SplatFile;
+use gigalod::format::{Container, FileStore};
+use gigalod::geom::{Camera, ImageSize};
+use gigalod::import::Batch;
+use gigalod::render::{Frame, Gpu, Lighting, Look, Renderer};
+use gigalod::runtime::residency::InlineLoader;
+use gigalod::runtime::splats::MATERIAL_SRGB;
+use gigalod::runtime::{Instance, Residency, Scene, Similarity, ViewId};
+use gigalod_reference::judge::{Drawn, judge};
+use gigalod_reference::raytrace::supersampled_coverage;
+use gigalod_reference::{Bvh, Mesh, Picture, Shading, Truth, metrics, shade};
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+const SIZE: ImageSize = ImageSize { width: 800, height: 600 };
+
+fn main() -> Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [model, out, rest @ ..] = &arguments[..] else {
+        anyhow::bail!("usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX]]");
+    };
+    let number = |at: usize, default: f64| rest.get(at).map_or(Ok(default), |text: &String| text.parse::<f64>());
+    let (orbit_deg, zoom, threshold_px) = ([number(0, 0.0)?, number(1, 0.0)?], number(2, 1.0)?, number(3, 1.0)?);
+
+    let mesh = read(Path::new(model))?;
+    let folder = tempfile::tempdir()?;
+    let built = folder.path().join("model.glod");
+    let stream = gigalod::import::open(Box::new(File::open(model)?))?;
+    splats::build(stream, &Options::default(), &NoProgress, &built)?;
+    let file = Arc::new(SplatFile::open(Container::open(Arc::new(FileStore::open(&built)?))?)?);
+    let up = file.skeleton().root().up;
+    let mut residency = Residency::new(4 << 30, Box::new(InlineLoader::default()));
+    let id = residency.add(file);
+    let mut scene = Scene::new(residency);
+    scene.add(Instance { file: id, placement: Similarity::IDENTITY });
+
+    let camera = Camera::orbit(&mesh.bounds(), up, orbit_deg, zoom, 40f64.to_radians(), SIZE);
+    let report = scene.select_converged(ViewId(0), &camera, threshold_px as f32);
+    let draws = scene.draws(ViewId(0)).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
+    let frame = Frame { camera, look: Look::default(), draws };
+    let drawn = Renderer::new(Gpu::open()?)?.picture(&frame)?;
+    let splats =
+        Picture { size: SIZE, pixels: drawn.rgba.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect() };
+
+    let bvh = Bvh::build(&mesh);
+    let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
+    let shading = Shading {
+        to_light: camera.shoulder_light(),
+        background_srgb: Lighting::default().background,
+        plain_albedo_srgb: MATERIAL_SRGB,
+    };
+    let expected = shade::picture(&truth, &shading);
+    let footprint = report.limited_by.is_some().then_some(&drawn.footprint_px[..]);
+    let judged = Drawn { depth: &drawn.depth, data_footprint_px: footprint };
+    let verdict = judge(&truth, &supersampled_coverage(&bvh, &camera, 4), &judged, threshold_px);
+    let compared = metrics::compare(&expected, &splats, Some(&metrics::silhouette_mask(&truth)));
+    println!("{model}: {report:?}\n{} holes, {} fat, {compared:?}", verdict.holes.len(), verdict.fat.len());
+
+    let mut difference: Vec<[u8; 3]> = std::iter::zip(&expected.pixels, &splats.pixels)
+        .map(|(a, b)| std::array::from_fn(|channel| a[channel].abs_diff(b[channel]).saturating_mul(4)))
+        .collect();
+    let mut mark = |[x, y]: [u32; 2], color| difference[(y * SIZE.width + x) as usize] = color;
+    verdict.holes.iter().for_each(|hole| mark(hole.pixel, [255, 0, 0]));
+    verdict.fat.iter().for_each(|pixel| mark(*pixel, [0, 255, 0]));
+    write_sheet(Path::new(out), [&splats.pixels, &expected.pixels, &difference])
+}
+
+fn read(path: &Path) -> Result<Mesh> {
+    let mut stream = gigalod::import::open(Box::new(File::open(path).context(path.display().to_string())?))?;
+    let (mut positions, mut normals, mut colors, mut triangles) = (vec![], vec![], vec![], vec![]);
+    let mut batch = Batch::default();
+    while stream.next(&mut batch)? {
+        positions.append(&mut batch.vertices.positions);
+        normals.append(&mut batch.vertices.normals);
+        colors.append(&mut batch.vertices.colors);
+        triangles.append(&mut batch.triangles);
+    }
+    let has = stream.attributes();
+    Ok(Mesh::new(positions, has.normals.then_some(normals), has.colors.then_some(colors), triangles)?)
+}
+
+fn write_sheet(path: &Path, pictures: [&Vec<[u8; 3]>; 3]) -> Result<()> {
+    let width = SIZE.width as usize;
+    let rows = (0..SIZE.height as usize).flat_map(|row| pictures.map(|picture| &picture[row * width..][..width]));
+    let bytes: Vec<u8> = rows.flat_map(|row| row.as_flattened().to_vec()).collect();
+    let mut encoder = png::Encoder::new(std::io::BufWriter::new(File::create(path)?), SIZE.width * 3, SIZE.height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.write_header()?.write_image_data(&bytes)?;
+    Ok(())
+}
