@@ -17,9 +17,11 @@ pub const MAGIC: [u8; 8] = *b"\x89GLOD\r\n\x1a";
 pub const VERSION: u32 = 1;
 /// Bytes before the skeleton.
 pub const HEADER_BYTES: u64 = 128;
-/// Names of the feature bits that a reader must know to read a file; none yet.
-const FEATURES: [&str; 0] = [];
-/// More is not a skeleton but an attack: 2^32 page records would not fit either.
+/// Feature bits that this program knows; none is defined yet.
+const KNOWN_FEATURES: u64 = 0;
+/// Bounds what a hostile (sparse) file can make a reader allocate. 13 million page records: 110 billion splats.
+const MAX_SKELETON_BYTES: u64 = 256 << 20;
+/// The same for the metadata, a few kilobytes in truth.
 const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 /// Which representation a file holds.
@@ -108,10 +110,9 @@ impl Container {
         let metadata_checksum = fields.u32();
         let metadata = Section { offset: fields.u64(), bytes: fields.u64(), checksum: metadata_checksum };
         let pages_offset = fields.u64();
-        let unknown = features.trailing_zeros();
-        if features >> FEATURES.len() != 0 {
-            let name = FEATURES.get(unknown as usize).map_or(format!("feature bit {unknown}"), |name| name.to_string());
-            return Err(FormatError::Feature { name });
+        let unknown = features & !KNOWN_FEATURES;
+        if unknown != 0 {
+            return Err(FormatError::Feature { name: format!("feature bit {}", unknown.trailing_zeros()) });
         }
         if kind_code != Kind::Splats.code() {
             let found = format!("representation {kind_code}");
@@ -150,9 +151,9 @@ impl Container {
     /// The bytes of the skeleton, checked.
     ///
     /// # Errors
-    /// [`FormatError::Checksum`] and [`FormatError::Io`].
+    /// [`FormatError::Checksum`], [`FormatError::Io`], and [`FormatError::Invalid`] where it is larger than any.
     pub fn read_skeleton(&self) -> Result<Vec<u8>, FormatError> {
-        self.read("the skeleton", self.skeleton)
+        self.read("the skeleton", self.skeleton, MAX_SKELETON_BYTES)
     }
 
     /// What `info` shows.
@@ -161,23 +162,26 @@ impl Container {
     /// As for the skeleton, and [`FormatError::Invalid`] where it is not the JSON it should be.
     pub fn read_metadata(&self) -> Result<Metadata, FormatError> {
         let what = "the metadata";
-        if self.metadata.bytes > MAX_METADATA_BYTES {
-            let problem = format!("{} bytes, expected at most {MAX_METADATA_BYTES}", self.metadata.bytes);
-            return Err(FormatError::invalid(what, problem));
-        }
-        let bytes = self.read(what, self.metadata)?;
+        let bytes = self.read(what, self.metadata, MAX_METADATA_BYTES)?;
         serde_json::from_slice(&bytes).map_err(|error| FormatError::invalid(what, error.to_string()))
     }
 
-    fn read(&self, what: &str, section: Section) -> Result<Vec<u8>, FormatError> {
+    fn read(&self, what: &str, section: Section, most_bytes: u64) -> Result<Vec<u8>, FormatError> {
+        if section.bytes > most_bytes {
+            let problem = format!("{} bytes, expected at most {most_bytes}", section.bytes);
+            return Err(FormatError::invalid(what, problem));
+        }
         read_checked(&*self.store, what, section)
     }
 }
 
-/// Reads a range whose end was checked against the store's length, and checks its checksum.
+/// Reads a range whose length and end were checked, and checks its checksum. Want of memory is an error, not an abort.
 pub(crate) fn read_checked(store: &dyn PageStore, what: &str, section: Section) -> Result<Vec<u8>, FormatError> {
-    let mut bytes = vec![0; section.bytes as usize];
-    store.read_at(section.offset, &mut bytes).map_err(|source| FormatError::Io { what: what.into(), source })?;
+    let failed = |source: io::Error| FormatError::Io { what: what.into(), source };
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(section.bytes as usize).map_err(|_| failed(io::ErrorKind::OutOfMemory.into()))?;
+    bytes.resize(section.bytes as usize, 0);
+    store.read_at(section.offset, &mut bytes).map_err(failed)?;
     check(what, &bytes, section.checksum)?;
     Ok(bytes)
 }

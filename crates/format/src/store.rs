@@ -39,12 +39,12 @@ impl FileStore {
     /// # Errors
     /// What the system says.
     pub fn open(path: &std::path::Path) -> io::Result<Self> {
-        let file = std::fs::File::open(path)?;
-        let metadata = file.metadata()?;
-        if !metadata.is_file() {
+        // Before opening, because opening a named pipe waits for its other end.
+        if !std::fs::metadata(path)?.is_file() {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
         }
-        Ok(Self { bytes: metadata.len(), file, bytes_read: AtomicU64::new(0) })
+        let file = std::fs::File::open(path)?;
+        Ok(Self { bytes: file.metadata()?.len(), file, bytes_read: AtomicU64::new(0) })
     }
 }
 

@@ -58,11 +58,7 @@ impl Aabb {
     /// The eight corners.
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|corner| {
-            DVec3::select(
-                glam::BVec3::new(corner & 1 != 0, corner & 2 != 0, corner & 4 != 0),
-                self.max,
-                self.min,
-            )
+            DVec3::select(glam::BVec3::new(corner & 1 != 0, corner & 2 != 0, corner & 4 != 0), self.max, self.min)
         })
     }
 }

@@ -66,7 +66,14 @@ impl Camera {
     ///
     /// `orbit` is azimuth and elevation in degrees. At (0, 0) the camera looks along −z with y up (z-up models: along +y
     /// with z up); a growing azimuth turns it counter-clockwise seen from above; a growing elevation raises the eye.
-    pub fn orbit(bounds: &Aabb, world_up: UpAxis, orbit_deg: [f64; 2], zoom: f64, fov_y_rad: f64, size: ImageSize) -> Self {
+    pub fn orbit(
+        bounds: &Aabb,
+        world_up: UpAxis,
+        orbit_deg: [f64; 2],
+        zoom: f64,
+        fov_y_rad: f64,
+        size: ImageSize,
+    ) -> Self {
         let [azimuth, elevation] = orbit_deg.map(f64::to_radians);
         let (sin_az, cos_az) = (libm::sin(azimuth), libm::cos(azimuth));
         let (sin_el, cos_el) = (libm::sin(elevation), libm::cos(elevation));

@@ -1,4 +1,4 @@
-//! What a pixel shows before it is lit: albedo, normal, depth.
+//! What a pixel shows before it is lit: albedo, normal, linear depth.
 
 use gigalod_geom::ImageSize;
 
@@ -6,9 +6,14 @@ use gigalod_geom::ImageSize;
 pub(crate) const ALBEDO: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 /// World space; w holds the extent in pixels of what was drawn there.
 pub(crate) const NORMAL: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// near / z: 1 at the near plane, 0 at infinity and for background. As a float this has the same relative precision at all
-/// distances, and unlike a 32-bit colour target it can be drawn to on every adapter; z is `near / depth`.
-pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Distance along the view axis in world units, as the bits of an `f32`: unlike a 32-bit float target, a 32-bit integer one can
+/// be drawn to and copied on every adapter, OpenGL included.
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+/// What [`DEPTH`] holds where there is nothing.
+pub(crate) const NO_DEPTH: wgpu::Color = wgpu::Color { r: 0x7f80_0000 as f64, g: 0.0, b: 0.0, a: 0.0 };
+/// For the depth test alone. near / z: 1 at the near plane, 0 at infinity; as a float that has the same relative precision at
+/// all distances.
+pub(crate) const DEPTH_TEST: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// The G-buffer of one picture size.
 #[derive(Debug)]
@@ -17,6 +22,7 @@ pub(crate) struct GBuffer {
     pub(crate) albedo: wgpu::Texture,
     pub(crate) normal: wgpu::Texture,
     pub(crate) depth: wgpu::Texture,
+    pub(crate) depth_test: wgpu::Texture,
 }
 
 impl GBuffer {
@@ -30,12 +36,13 @@ impl GBuffer {
             albedo: texture("albedo", ALBEDO),
             normal: texture("normal", NORMAL),
             depth: texture("depth", DEPTH),
+            depth_test: texture("depth test", DEPTH_TEST),
         }
     }
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        self.size.pixels() as u64 * (4 + 8 + 4)
+        self.size.pixels() as u64 * (4 + 8 + 4 + 4)
     }
 }
 

@@ -84,7 +84,6 @@ impl LightPass {
                 ),
                 entry(1, texture(unfiltered)),
                 entry(2, texture(unfiltered)),
-                entry(3, texture(wgpu::TextureSampleType::Depth)),
             ],
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -141,7 +140,7 @@ impl LightPass {
             ambient: AMBIENT,
         };
         let uniform = buffer_with(device, "light params", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&params));
-        let [albedo, normal, depth] = [&gbuffer.albedo, &gbuffer.normal, &gbuffer.depth].map(gbuffer::view);
+        let [albedo, normal] = [&gbuffer.albedo, &gbuffer.normal].map(gbuffer::view);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("light"),
@@ -150,7 +149,6 @@ impl LightPass {
                 entry(0, uniform.as_entire_binding()),
                 entry(1, wgpu::BindingResource::TextureView(&albedo)),
                 entry(2, wgpu::BindingResource::TextureView(&normal)),
-                entry(3, wgpu::BindingResource::TextureView(&depth)),
             ],
         })
     }

@@ -4,12 +4,7 @@ use crate::{Gpu, RenderError};
 use std::sync::mpsc;
 
 /// Copies a texture into rows of `bytes_per_pixel` times its width, without padding. Blocks until the device is done.
-pub(crate) fn read_texture(
-    gpu: &Gpu,
-    texture: &wgpu::Texture,
-    aspect: wgpu::TextureAspect,
-    bytes_per_pixel: u32,
-) -> Result<Vec<u8>, RenderError> {
+pub(crate) fn read_texture(gpu: &Gpu, texture: &wgpu::Texture, bytes_per_pixel: u32) -> Result<Vec<u8>, RenderError> {
     let (width, height) = (texture.width(), texture.height());
     let row = width * bytes_per_pixel;
     let padded_row = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -21,7 +16,7 @@ pub(crate) fn read_texture(
     });
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     encoder.copy_texture_to_buffer(
-        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect },
+        texture.as_image_copy(),
         wgpu::TexelCopyBufferInfo {
             buffer: &buffer,
             layout: wgpu::TexelCopyBufferLayout {

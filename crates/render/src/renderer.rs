@@ -109,14 +109,18 @@ impl Renderer {
 
         let lit = self.light_pass.bind(device, gbuffer, &frame.camera, &frame.look.lighting);
         let mut encoder = device.create_command_encoder(&Default::default());
-        let [albedo, normal, depth, target] =
-            [&gbuffer.albedo, &gbuffer.normal, &gbuffer.depth, picture].map(gbuffer::view);
+        let [albedo, normal, depth, depth_test, target] =
+            [&gbuffer.albedo, &gbuffer.normal, &gbuffer.depth, &gbuffer.depth_test, picture].map(gbuffer::view);
         {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("G-buffer"),
-                color_attachments: &[Some(cleared(&albedo)), Some(cleared(&normal))],
+                color_attachments: &[
+                    Some(cleared(&albedo, wgpu::Color::TRANSPARENT)),
+                    Some(cleared(&normal, wgpu::Color::TRANSPARENT)),
+                    Some(cleared(&depth, gbuffer::NO_DEPTH)),
+                ],
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &depth,
+                    view: &depth_test,
                     depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                     stencil_ops: None,
                 }),
@@ -129,7 +133,7 @@ impl Renderer {
         {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("light"),
-                color_attachments: &[Some(cleared(&target))],
+                color_attachments: &[Some(cleared(&target, wgpu::Color::TRANSPARENT))],
                 ..Default::default()
             });
             self.light_pass.draw(&mut pass, &lit);
@@ -137,33 +141,24 @@ impl Renderer {
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.check()?;
 
-        let all = wgpu::TextureAspect::All;
-        let rgba = read_texture(&self.gpu, picture, all, 4)?;
-        let depth = read_texture(&self.gpu, &gbuffer.depth, wgpu::TextureAspect::DepthOnly, 4)?;
-        let normal = read_texture(&self.gpu, &gbuffer.normal, all, 8)?;
+        let rgba = read_texture(&self.gpu, picture, 4)?;
+        let depth = read_texture(&self.gpu, &gbuffer.depth, 4)?;
+        let normal = read_texture(&self.gpu, &gbuffer.normal, 8)?;
         Ok(Picture {
             size,
             rgba,
-            depth: depth
-                .as_chunks()
-                .0
-                .iter()
-                .map(|bytes| match f32::from_le_bytes(*bytes) {
-                    0.0 => f32::INFINITY,
-                    stored => (near / f64::from(stored)) as f32,
-                })
-                .collect(),
+            depth: depth.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(),
             footprint_px: normal.as_chunks::<8>().0.iter().map(|pixel| f32_of_f16([pixel[6], pixel[7]])).collect(),
         })
     }
 }
 
-fn cleared(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
+fn cleared(view: &wgpu::TextureView, color: wgpu::Color) -> wgpu::RenderPassColorAttachment<'_> {
     wgpu::RenderPassColorAttachment {
         view,
         depth_slice: None,
         resolve_target: None,
-        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store },
+        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(color), store: wgpu::StoreOp::Store },
     }
 }
 

@@ -93,7 +93,7 @@ impl SplatPass {
             },
             primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
-                format: gbuffer::DEPTH,
+                format: gbuffer::DEPTH_TEST,
                 depth_write_enabled: Some(true),
                 depth_compare: Some(wgpu::CompareFunction::Greater),
                 stencil: Default::default(),
@@ -104,7 +104,7 @@ impl SplatPass {
                 module: &module,
                 entry_point: Some("cover"),
                 compilation_options: Default::default(),
-                targets: &[Some(gbuffer::ALBEDO.into()), Some(gbuffer::NORMAL.into())],
+                targets: &[Some(gbuffer::ALBEDO.into()), Some(gbuffer::NORMAL.into()), Some(gbuffer::DEPTH.into())],
             }),
             multiview_mask: None,
             cache: None,

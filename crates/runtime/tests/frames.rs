@@ -85,7 +85,7 @@ fn a_selector_on_the_device_is_served_like_one_on_the_host() {
 
     let host_scene = scene(statue(), 1 << 30);
     let camera = camera(&host_scene, 20.0, 2.0);
-    let mut residency = Residency::new(1 << 30, Box::new(InlineLoader::default()));
+    let mut residency = Residency::new(1 << 30, Box::<InlineLoader>::default());
     let file = residency.add(statue());
     // A ring too small for all requests: what is dropped is asked for again.
     let ring = RequestRing::new(3);
@@ -153,7 +153,7 @@ impl Loader for LazyLoader {
 
 #[test]
 fn requests_of_an_older_frame_are_cancelled_and_the_most_useful_come_first() {
-    let mut residency = Residency::new(1 << 30, Box::new(LazyLoader::default()));
+    let mut residency = Residency::new(1 << 30, Box::<LazyLoader>::default());
     let file = residency.add(statue());
     let request = |page, benefit| PageRequest { key: PageKey { file, page: PageId(page) }, benefit };
     residency.serve(&[request(0, 1.0), request(1, 5.0), request(0, 9.0)]);
@@ -183,5 +183,5 @@ fn loading_on_threads_gives_the_same_cut() {
         (selection.draw.clone(), pages)
     };
     let threads = ThreadedLoader::new(3).unwrap();
-    assert!(drawn(Box::new(threads)) == drawn(Box::new(InlineLoader::default())));
+    assert!(drawn(Box::new(threads)) == drawn(Box::<InlineLoader>::default()));
 }

@@ -5,7 +5,9 @@
 //! each followed by a pointer word unless all its nodes are leaves, exactly as in the paper's figure 2b.
 //!
 //! What always holds after decoding, even of hostile bytes: a pointer leads forwards (to a later page, or a later word of
-//! the same page), so a traversal cannot run in circles.
+//! the same page), and the family there ends within its page. What cannot be seen from one page is whether a node announces
+//! as many children as the group has that its pointer leads to; where that is a lie, a traversal can take a node for a
+//! pointer, so it must count what it visits.
 
 use super::node::Node;
 use super::skeleton::{PageId, PageRecord, Skeleton};
@@ -147,7 +149,8 @@ impl Page {
             if end > room {
                 return Err(invalid(format!("a family ends at word {end} of page {}, which has {room}", family.page)));
             }
-            let forwards = family.page > page || (family.page == page && usize::from(family.word.0) > group_word);
+            let pointer_word = words.len();
+            let forwards = family.page > page || (family.page == page && usize::from(family.word.0) > pointer_word);
             let delta = u16::try_from(family.page.0 - record.first_child_page.0);
             let (true, Ok(delta)) = (forwards, delta) else {
                 return Err(invalid(format!(
@@ -186,8 +189,8 @@ impl Page {
         usize::from(self.nodes)
     }
 
-    /// Where the pointer in `word` leads; beyond the last page where `word` is no pointer but a node, as hostile tree bits
-    /// can make a traversal believe.
+    /// Where the pointer in `word` leads. Anywhere, also backwards and beyond the last page, where `word` is no pointer but a
+    /// node, as hostile tree bits can make a traversal believe.
     pub fn family(&self, word: u32) -> FamilyStart {
         FamilyStart { page: PageId(self.first_child_page.0.saturating_add(word >> 16)), word: WordIndex(word as u16) }
     }

@@ -123,19 +123,20 @@ impl Skeleton {
         let bounds = Aabb { min: vector(&mut fields), max: vector(&mut fields) };
         let (nodes, leaves, page_count) = (fields.u64(), fields.u64(), fields.u64());
         let (levels, flags, _reserved) = (fields.u32(), fields.u32(), fields.u32());
-        let sane = origin.is_finite()
-            && center.is_finite()
-            && bounds.min.is_finite()
-            && bounds.max.is_finite()
-            && !bounds.is_empty()
-            && (0.0..=f32::MAX).contains(&radius)
-            && (1.0..=64.0).contains(&overhang);
-        if !sane {
+        if !origin.is_finite() || !bounds.min.is_finite() || !bounds.max.is_finite() || bounds.is_empty() {
+            return Err(invalid(format!(
+                "an origin at {origin} and bounds from {} to {}, expected finite numbers, the smaller first",
+                bounds.min, bounds.max
+            )));
+        }
+        if !center.is_finite() || !(0.0..=f32::MAX).contains(&radius) || !(1.0..=64.0).contains(&overhang) {
             return Err(invalid(format!(
                 "a root sphere at {center} with radius {radius} and overhang {overhang}, expected finite numbers, a radius ≥ 0, an overhang of 1–64"
             )));
         }
-        if Self::encoded_bytes(page_count.min(u64::from(u32::MAX))) != bytes.len() as u64 || page_count == 0 {
+        let record_bytes = bytes.len() - ROOT_BYTES;
+        let whole = record_bytes.is_multiple_of(RECORD_BYTES) && (record_bytes / RECORD_BYTES) as u64 == page_count;
+        if !whole || !(1..=u64::from(u32::MAX)).contains(&page_count) {
             return Err(invalid(format!("{page_count} pages in {} bytes of skeleton", bytes.len())));
         }
         if flags & !(HAS_COLORS | CLOSED | Z_UP) != 0 {
@@ -172,15 +173,18 @@ impl Skeleton {
             };
             page::check_record(&record, number, page_count)?;
             offsets.push(offset);
-            offset += u64::from(record.bytes);
+            offset = offset.saturating_add(u64::from(record.bytes));
             counted += u64::from(record.nodes);
             pages.push(record);
         }
         if offset > file_bytes {
             return Err(FormatError::Truncated { what: "the last page".into(), end: offset, file_bytes });
         }
-        if counted != nodes || leaves > nodes {
-            return Err(invalid(format!("pages of {counted} nodes, expected {nodes}, {leaves} of them leaves")));
+        if counted != nodes {
+            return Err(invalid(format!("pages of {counted} nodes in all, expected {nodes}")));
+        }
+        if !(1..=nodes).contains(&leaves) || !(1..=nodes).contains(&u64::from(levels)) {
+            return Err(invalid(format!("{leaves} leaves on {levels} levels, expected 1–{nodes} of each")));
         }
         Ok(Self { root, pages, offsets })
     }

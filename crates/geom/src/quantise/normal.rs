@@ -55,7 +55,13 @@ fn cell(slope: f32) -> usize {
 pub fn encode(normal: Vec3) -> u16 {
     let n = normal.to_array();
     let size = n.map(f32::abs);
-    let axis = if size[0] >= size[1] && size[0] >= size[2] { 0 } else if size[1] >= size[2] { 1 } else { 2 };
+    let axis = if size[0] >= size[1] && size[0] >= size[2] {
+        0
+    } else if size[1] >= size[2] {
+        1
+    } else {
+        2
+    };
     let face = axis * 2 + usize::from(n[axis] < 0.0);
     let column = cell(n[(axis + 1) % 3] / size[axis]);
     let row = cell(n[(axis + 2) % 3] / size[axis]);

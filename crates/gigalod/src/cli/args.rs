@@ -48,6 +48,9 @@ pub(crate) struct BuildArgs {
     /// Representation
     #[arg(long = "as", value_enum, default_value_t = Representation::Auto)]
     pub(crate) representation: Representation,
+    /// Which way is up [default: as the format has it]
+    #[arg(long, value_enum)]
+    pub(crate) up: Option<UpAxisArg>,
     #[command(flatten)]
     pub(crate) options: BuildOptions,
 }

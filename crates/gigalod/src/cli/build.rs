@@ -1,6 +1,6 @@
 //! `gigalod build`.
 
-use super::args::{BuildArgs, BuildOptions};
+use super::args::{BuildArgs, BuildOptions, UpAxisArg};
 use super::error::{CliError, Outcome};
 use super::files;
 use super::parse::readable_bytes;
@@ -42,7 +42,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
     };
     files::check_output(&args.output, &[input])?;
     let usage = Usage::watch();
-    let report = build(input, &args.output, &args.options, None, console)?;
+    let report = build(input, &args.output, &args.options, args.up.map(UpAxis::from), console)?;
     let (seconds, cpu_seconds) = usage.seconds();
     let metadata = &report.metadata;
     let json = BuildReport {
@@ -68,6 +68,15 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         report.output_bytes as f64 / metadata.leaves as f64,
     );
     Ok(Outcome::new(&json, text))
+}
+
+impl From<UpAxisArg> for UpAxis {
+    fn from(up: UpAxisArg) -> Self {
+        match up {
+            UpAxisArg::Y => Self::Y,
+            UpAxisArg::Z => Self::Z,
+        }
+    }
 }
 
 /// Builds one model into one file, with progress.

@@ -51,6 +51,8 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     };
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
+        // Some values are a stranger's words: they shall not steer the terminal.
+        let value: String = value.chars().filter(|c| !c.is_control()).collect();
         let _ = writeln!(text, "{name:<12}{value}");
     };
     line("kind", format!("{} (format version {})", container.kind().name(), gigalod_format::VERSION));

@@ -55,7 +55,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(Outcome { json, text, good }) => {
             let said = say(&if cli.json { json + "\n" } else { text });
             if let Err(error) = &said {
-                console.line(&CliError::write(Path::new("standard output"), error));
+                console.line(CliError::write(Path::new("standard output"), error));
             }
             ExitCode::from(if good && said.is_ok() { 0 } else { 1 })
         }

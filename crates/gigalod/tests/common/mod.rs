@@ -94,7 +94,9 @@ pub(crate) fn twelve_directions() -> [[f64; 2]; 12] {
     std::array::from_fn(|corner| match corner {
         0 => [0.0, 90.0],
         11 => [0.0, -90.0],
-        corner => [corner as f64 * 72.0 + if corner > 5 { 36.0 } else { 0.0 }, if corner > 5 { -26.565 } else { 26.565 }],
+        corner => {
+            [corner as f64 * 72.0 + if corner > 5 { 36.0 } else { 0.0 }, if corner > 5 { -26.565 } else { 26.565 }]
+        }
     })
 }
 

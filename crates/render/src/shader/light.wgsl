@@ -1,9 +1,9 @@
 // light.wgsl: lights the G-buffer.
 //
 // Draw      one triangle that covers the picture.
-// Reads     params; albedo, normal and depth of the pixel.
+// Reads     params; albedo (alpha 0: nothing there) and normal of the pixel.
 // Writes    the picture, in linear light; the target encodes it as sRGB.
-// Limits    none beyond the baseline of WebGPU.
+// Limits    none beyond the baseline of WebGPU; depth textures are not loaded from, which OpenGL cannot.
 //
 // Lambert with an ambient share, from both sides: the normal is turned to the side that is seen. A normal that points away by
 // less than GRAZING is left alone: there is no telling a back from a front whose smooth normal leans over the horizon, and
@@ -15,7 +15,6 @@
 @group(0) @binding(0) var<uniform> params: LightParams;
 @group(0) @binding(1) var albedo_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
-@group(0) @binding(3) var depth_texture: texture_depth_2d;
 
 // Sine of the angle beyond the horizon, about 14°.
 const GRAZING: f32 = 0.25;
@@ -28,7 +27,8 @@ fn cover_picture(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f
 @fragment
 fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let pixel = vec2u(position.xy);
-    if textureLoad(depth_texture, pixel, 0) == 0.0 {
+    let albedo = textureLoad(albedo_texture, pixel, 0);
+    if albedo.a == 0.0 {
         return params.background;
     }
     let from_middle = position.xy - params.size_px * 0.5;
@@ -37,6 +37,5 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let away = dot(stored, ray) > GRAZING * length(ray) * length(stored);
     let normal = normalize(select(stored, -stored, away));
     let direct = (1.0 - params.ambient) * max(dot(normal, params.towards_light.xyz), 0.0);
-    let albedo = textureLoad(albedo_texture, pixel, 0).rgb;
-    return vec4f(albedo * params.light.rgb * (params.ambient + direct), 1.0);
+    return vec4f(albedo.rgb * params.light.rgb * (params.ambient + direct), 1.0);
 }

@@ -2,8 +2,8 @@
 //
 // Draw      one instance a splat, 4 vertices each (a triangle strip).
 // Reads     params; the instance's `SplatDraw`.
-// Writes    albedo (sRGB; alpha 1), normal (world; w = largest distance between two of its pixels), depth (near / z: 1 at the near
-//           plane, 0 at infinity).
+// Writes    albedo (sRGB; alpha 1), normal (world; w = largest distance between two of its pixels), depth (the bits of z, world
+//           units), depth test (near / z: 1 at the near plane, 0 at infinity).
 // Limits    none beyond the baseline of WebGPU.
 //
 // With the eye at the origin, z the depth of a ball's centre c, d its distance, r the radius and f the focal length in
@@ -73,7 +73,8 @@ fn place(@builtin(vertex_index) corner: u32, splat: Splat) -> Corner {
 struct Surface {
     @location(0) albedo: vec4f,
     @location(1) normal_diameter: vec4f,
-    @builtin(frag_depth) depth: f32,
+    @location(2) depth_bits: u32,
+    @builtin(frag_depth) depth_test: f32,
 }
 
 @fragment
@@ -102,7 +103,8 @@ fn cover(in: Corner) -> Surface {
     var out: Surface;
     out.albedo = vec4f(in.albedo, 1.0);
     out.normal_diameter = in.normal_diameter;
-    out.depth = params.near / max(z, params.near);
+    out.depth_bits = bitcast<u32>(max(z, params.near));
+    out.depth_test = params.near / max(z, params.near);
     return out;
 }
 

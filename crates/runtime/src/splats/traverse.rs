@@ -10,7 +10,7 @@
 use crate::report::{CutReport, Limit};
 use crate::residency::Residency;
 use crate::selection::SelectInput;
-use gigalod_format::splats::{Node, PageId, WordIndex};
+use gigalod_format::splats::{Children, Node, PageId, WordIndex};
 use gigalod_geom::cone::{Facing, NormalCone};
 use gigalod_geom::frustum::Side;
 use gigalod_geom::quantise::{cone, normal, sphere};
@@ -98,7 +98,7 @@ pub fn cut(input: &SelectInput<'_>, cutting: &Cutting, work: &mut Work, sink: &m
     let root = file.skeleton().root();
     let mut report = CutReport::default();
     if residency.page(input.file, PageId(0)).is_none() {
-        // Nothing at all to draw yet: the whole root ball is the error.
+        // Nothing but the skeleton to draw from: the root ball.
         let [high, low] = input.view.eye_in_local(root.origin);
         let center = root.sphere.center - high - low;
         let px = projected::diameter_px(
@@ -107,9 +107,19 @@ pub fn cut(input: &SelectInput<'_>, cutting: &Cutting, work: &mut Work, sink: &m
             root.sphere.radius,
             input.view.focal_px,
         );
-        report.max_error_px = px;
-        report.limited_by = Some(Limit::Residency);
         sink.miss(PageId(0), px);
+        // The skeleton has no normal for it: it faces whoever looks.
+        let facing = normal::encode(-center);
+        let visited = VisitedNode {
+            node: Node::pack(sphere::SELF, facing, 3, Children::NONE),
+            color: None,
+            center_in_eye: center,
+            radius: root.sphere.radius,
+            level: 0,
+            place: (PageId(0), WordIndex(0)),
+        };
+        report.drew(px, Some(Limit::Residency));
+        sink.draw(&visited);
         return report;
     }
     // What shows its back is hidden by what shows its front: of a closed surface, seen from outside.

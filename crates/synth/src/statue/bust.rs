@@ -1,7 +1,7 @@
 //! The whole bust as one signed distance, and which material is nearest.
 //!
 //! Takes a point in metres (y up, base at 0, chest towards +z, head not yet turned); gives the distance and the shares
-//! of skin, hair, beard, cloth and base. Start at [`bust`]; the radius along a ray is [`radius`].
+//! of skin, hair, beard, cloth and base. Start at [`bust`].
 
 use super::head::head;
 use super::ray::Ray;

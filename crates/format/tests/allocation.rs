@@ -1,0 +1,119 @@
+//! Files that claim to be enormous: opening one allocates no more than the format's limits. Alone in its program, because
+//! the allocator counts for all threads.
+
+use gigalod_format::splats::{PageId, SplatFile};
+use gigalod_format::{Container, PageStore, checksum};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+struct Counting;
+
+static LIVE: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: passes everything on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        PEAK.fetch_max(LIVE.fetch_add(layout.size(), Relaxed) + layout.size(), Relaxed);
+        // SAFETY: the caller's promises are those that the system's allocator asks for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        LIVE.fetch_sub(layout.size(), Relaxed);
+        // SAFETY: as above; `pointer` came from `System.alloc` with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// A sparse file: some bytes, then zeros as far as one likes.
+struct Sparse {
+    head: Vec<u8>,
+    bytes: u64,
+}
+
+impl PageStore for Sparse {
+    fn len(&self) -> u64 {
+        self.bytes
+    }
+
+    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<()> {
+        for (at, byte) in (offset..).zip(buffer) {
+            *byte = self.head.get(at as usize).copied().unwrap_or(0);
+        }
+        Ok(())
+    }
+
+    fn bytes_read(&self) -> u64 {
+        0
+    }
+}
+
+/// A header with these sections, then `rest`.
+fn sparse(bytes: u64, skeleton: (u64, &[u8]), metadata_bytes: u64) -> Arc<Sparse> {
+    let mut head = b"\x89GLOD\r\n\x1a\x01\0\0\0\x01\0\0\0".to_vec();
+    for field in [0, bytes, 128, skeleton.0] {
+        head.extend(u64::to_le_bytes(field));
+    }
+    head.extend(checksum(skeleton.1).to_le_bytes());
+    head.extend(0u32.to_le_bytes());
+    for field in [4096, metadata_bytes, 8192] {
+        head.extend(u64::to_le_bytes(field));
+    }
+    head.resize(124, 0);
+    head.extend(checksum(&head).to_le_bytes());
+    head.extend(skeleton.1);
+    Arc::new(Sparse { head, bytes })
+}
+
+/// What `act` allocates at most, beyond what was there.
+fn peak_of<T>(act: impl FnOnce() -> T) -> (T, usize) {
+    let before = LIVE.load(Relaxed);
+    PEAK.store(before, Relaxed);
+    let result = act();
+    (result, PEAK.load(Relaxed) - before)
+}
+
+#[test]
+fn claims_of_enormous_sections_allocate_next_to_nothing() {
+    const HUGE: u64 = 1 << 62;
+    let store = sparse(HUGE, (HUGE / 2, &[]), HUGE / 2);
+    let (found, peak) = peak_of(|| {
+        let container = Container::open(store).unwrap();
+        let metadata = container.read_metadata().unwrap_err().to_string();
+        (metadata, SplatFile::open(container).unwrap_err().to_string())
+    });
+    assert_eq!(found.0, format!("the metadata: {} bytes, expected at most 16777216", HUGE / 2));
+    assert_eq!(found.1, format!("the skeleton: {} bytes, expected at most 268435456", HUGE / 2));
+    assert!(peak < 4096, "{peak} bytes");
+
+    // A skeleton that is all right but for its number of pages, and the largest page a record can claim.
+    let mut skeleton = vec![0; 148];
+    skeleton[40..44].copy_from_slice(&1f32.to_le_bytes());
+    skeleton[92..100].copy_from_slice(&8192u64.to_le_bytes());
+    skeleton[100..108].copy_from_slice(&1u64.to_le_bytes());
+    skeleton[116..120].copy_from_slice(&1u32.to_le_bytes());
+    for pages in [1u64, 1 << 40, u64::MAX] {
+        skeleton[108..116].copy_from_slice(&pages.to_le_bytes());
+        skeleton[128..132].copy_from_slice(&(4 + 7 * 8192u32).to_le_bytes());
+        skeleton[142..146].copy_from_slice(&[0, 0x20, 0, 0x40]);
+        // CRC-32C of the zeros that the page consists of.
+        skeleton[132..136].copy_from_slice(&checksum(&vec![0; 4 + 7 * 8192]).to_le_bytes());
+        let store = sparse(HUGE, (148, &skeleton), 0);
+        let (found, peak) = peak_of(|| {
+            let file = SplatFile::open(Container::open(store).unwrap());
+            file.and_then(|file| file.read_page(PageId(0)).map(|_| ())).unwrap_err().to_string()
+        });
+        if pages == 1 {
+            assert_eq!(found, "page 0: 57344 bytes for 8192 nodes in 0 groups, expected 32768");
+        } else {
+            assert_eq!(found, format!("the skeleton: {pages} pages in 148 bytes of skeleton"));
+        }
+        assert!(peak < 64 << 10, "{peak} bytes");
+    }
+}

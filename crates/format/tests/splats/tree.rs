@@ -1,0 +1,234 @@
+//! Trees to be written, and a slow, obvious writer: breadth-first, families into pages.
+
+use gigalod_format::splats::page::CODEC_RAW;
+use gigalod_format::splats::{Children, Node, PageContents, PageId, PageRecord, Root, Skeleton, SplatFile, WordIndex};
+use gigalod_format::{Bounds, Container, FormatError, InputCounts, Kind, MemoryStore, Metadata, Writer};
+use gigalod_geom::camera::UpAxis;
+use gigalod_geom::quantise::{normal, sphere};
+use gigalod_geom::{Aabb, Sphere};
+use glam::{DVec3, Vec3};
+use std::collections::{BTreeMap, VecDeque};
+use std::io::Cursor;
+use std::sync::Arc;
+
+/// A node and, by index, its children.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TreeNode {
+    pub(crate) children: Vec<usize>,
+    pub(crate) sphere: u16,
+    pub(crate) normal: u16,
+    pub(crate) cone: u8,
+    pub(crate) color: u16,
+}
+
+/// Node 0 is the root. Children may have any indices.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tree {
+    pub(crate) nodes: Vec<TreeNode>,
+    pub(crate) has_colors: bool,
+}
+
+/// SplitMix64.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) % end as u64) as usize
+    }
+}
+
+/// Which leaf gets children next: decides between even, ragged and chain-like trees.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Growth {
+    Oldest,
+    Random,
+    Newest,
+}
+
+impl Tree {
+    /// A tree of `inner` nodes with 2–4 children each.
+    pub(crate) fn grow(inner: usize, growth: Growth, has_colors: bool, random: &mut Random) -> Self {
+        let mut tree = Self { nodes: vec![marked(0)], has_colors };
+        let mut leaves = VecDeque::from([0]);
+        for _ in 0..inner {
+            let at = match growth {
+                Growth::Oldest => 0,
+                Growth::Random => random.below(leaves.len()),
+                Growth::Newest => leaves.len() - 1,
+            };
+            let parent = leaves.remove(at).expect("there is always a leaf");
+            for _ in 0..2 + random.below(3) {
+                let child = tree.nodes.len();
+                tree.nodes[parent].children.push(child);
+                leaves.push_back(child);
+                tree.nodes.push(marked(child));
+            }
+        }
+        tree
+    }
+
+    pub(crate) fn leaves(&self) -> usize {
+        self.nodes.iter().filter(|node| node.children.is_empty()).count()
+    }
+
+    /// The node as it must come back.
+    pub(crate) fn packed(&self, index: usize) -> Node {
+        let node = &self.nodes[index];
+        let all_leaves = !node.children.is_empty() && !self.has_grandchildren(index);
+        let children = Children { count: node.children.len() as u8, all_leaves };
+        Node::pack(node.sphere, node.normal, node.cone, children)
+    }
+
+    fn has_grandchildren(&self, index: usize) -> bool {
+        self.nodes[index].children.iter().any(|child| !self.nodes[*child].children.is_empty())
+    }
+
+    /// The groups that hang from a group, if any does.
+    fn family_of(&self, group: &[usize]) -> Vec<Vec<usize>> {
+        group.iter().map(|index| self.nodes[*index].children.clone()).filter(|group| !group.is_empty()).collect()
+    }
+
+    fn levels(&self) -> u32 {
+        let mut level = vec![0];
+        for depth in 0.. {
+            level = level.iter().flat_map(|index: &usize| self.nodes[*index].children.clone()).collect();
+            if level.is_empty() {
+                return depth + 1;
+            }
+        }
+        unreachable!("a tree ends")
+    }
+
+    /// A file whose pages hold at most `page_nodes` nodes (at least 16: a family must fit), and the parts it is made of.
+    pub(crate) fn write(&self, page_nodes: usize) -> Vec<u8> {
+        self.write_with(page_nodes, &root(self), &metadata(self))
+    }
+
+    /// The same with a root and metadata of the caller's.
+    pub(crate) fn write_with(&self, page_nodes: usize, root: &Root, metadata: &Metadata) -> Vec<u8> {
+        // All families, breadth first, and for each group the number of the family below it.
+        let mut families = vec![vec![vec![0]]];
+        let mut below = BTreeMap::new();
+        let mut at = 0;
+        while at < families.len() {
+            for (place, group) in families[at].clone().iter().enumerate() {
+                let family = self.family_of(group);
+                if !family.is_empty() {
+                    below.insert((at, place), families.len());
+                    families.push(family);
+                }
+            }
+            at += 1;
+        }
+        // Where each family begins.
+        let (mut pages, mut starts) = (vec![Vec::new()], Vec::new());
+        let (mut nodes, mut words) = (0, 0);
+        for (number, family) in families.iter().enumerate() {
+            let more: usize = family.iter().map(Vec::len).sum();
+            if nodes + more > page_nodes {
+                pages.push(Vec::new());
+                (nodes, words) = (0, 0);
+            }
+            starts.push((PageId(pages.len() as u32 - 1), WordIndex(words as u16)));
+            pages.last_mut().expect("one page at least").push(number);
+            nodes += more;
+            words += more + (0..family.len()).filter(|place| below.contains_key(&(number, *place))).count();
+        }
+
+        let (mut records, mut encoded) = (Vec::new(), Vec::new());
+        for page in &pages {
+            let mut contents = PageContents::default();
+            let mut families_below: Vec<usize> = Vec::new();
+            for number in page {
+                for (place, group) in families[*number].iter().enumerate() {
+                    contents.group_sizes.push(group.len() as u8);
+                    contents.nodes.extend(group.iter().map(|index| self.packed(*index)));
+                    if self.has_colors {
+                        contents.colors.extend(group.iter().map(|index| self.nodes[*index].color));
+                    }
+                    families_below.extend(below.get(&(*number, place)));
+                }
+            }
+            let bytes = contents.encode();
+            let start = families_below.first().map_or((PageId(0), WordIndex(0)), |family| starts[*family]);
+            records.push(PageRecord {
+                bytes: bytes.len() as u32,
+                checksum: gigalod_format::checksum(&bytes),
+                first_child_page: start.0,
+                first_child_word: start.1,
+                nodes: contents.nodes.len() as u16,
+                words: (contents.nodes.len() + families_below.len()) as u16,
+                codec: CODEC_RAW,
+            });
+            encoded.push(bytes);
+        }
+
+        let skeleton = Skeleton::encode(root, &records);
+        let mut writer = Writer::new(Cursor::new(Vec::new()), Kind::Splats, skeleton.len() as u64).unwrap();
+        for page in &encoded {
+            writer.page(page).unwrap();
+        }
+        let (out, file_bytes) = writer.finish(&skeleton, metadata).unwrap();
+        assert_eq!(out.get_ref().len() as u64, file_bytes);
+        out.into_inner()
+    }
+}
+
+/// A leaf that can be told from all others by what is stored: 7621 and 16224 have no common factor.
+fn marked(index: usize) -> TreeNode {
+    TreeNode {
+        children: Vec::new(),
+        sphere: (index * 4099 % sphere::CODES) as u16,
+        normal: (index % normal::CODES) as u16,
+        cone: (index % 4) as u8,
+        color: (index * 40_503) as u16,
+    }
+}
+
+pub(crate) fn root(tree: &Tree) -> Root {
+    Root {
+        origin: DVec3::new(1e6, -2e6, 0.1),
+        sphere: Sphere { center: Vec3::new(0.25, -0.5, 0.3), radius: 10.7 },
+        overhang: 1.75,
+        bounds: Aabb {
+            min: DVec3::new(999_990.0, -2_000_010.0, -9.9),
+            max: DVec3::new(1_000_010.0, -1_999_990.0, 10.1),
+        },
+        nodes: tree.nodes.len() as u64,
+        leaves: tree.leaves() as u64,
+        levels: tree.levels(),
+        has_colors: tree.has_colors,
+        closed: true,
+        up: UpAxis::Z,
+    }
+}
+
+pub(crate) fn metadata(tree: &Tree) -> Metadata {
+    let root = root(tree);
+    Metadata {
+        generator: "tests 1".into(),
+        input: InputCounts { triangles: 7, vertices: root.leaves, points: 0 },
+        options: BTreeMap::from([("as".into(), "splats".into())]),
+        nodes: root.nodes,
+        levels: root.levels,
+        leaves: root.leaves,
+        raw_bytes: 1,
+        closed: root.closed,
+        bounds: Bounds { min: root.bounds.min.to_array(), max: root.bounds.max.to_array() },
+        attributes: vec!["normals".into()],
+        per_level: Vec::new(),
+    }
+}
+
+/// Opens a file in memory.
+pub(crate) fn open(bytes: &[u8]) -> Result<SplatFile, FormatError> {
+    SplatFile::open(Container::open(Arc::new(MemoryStore::new(bytes.to_vec())))?)
+}
+
+/// All page numbers of a file.
+pub(crate) fn page_ids(file: &SplatFile) -> impl Iterator<Item = PageId> + use<> {
+    (0..file.skeleton().pages().len() as u32).map(PageId)
+}
