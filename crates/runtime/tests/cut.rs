@@ -175,7 +175,7 @@ fn tree_bits_that_lie_end_the_traversal_instead_of_running_on() {
     let mut changed = records.clone();
     let end = start + records[page.0 as usize].bytes as usize;
     changed[page.0 as usize].checksum = gigalod_format::checksum(&bytes[start..end]);
-    let skeleton = gigalod_format::splats::Skeleton::encode(file.skeleton().root(), &changed);
+    let skeleton = gigalod_format::splats::Skeleton::encode(file.skeleton().root(), &changed, None);
     let metadata = file.container().read_metadata().unwrap();
     let mut out = std::io::Cursor::new(Vec::new());
     let mut writer =

@@ -3,10 +3,12 @@
 use super::contract::ChildList;
 use super::tree::Binary;
 use crate::progress::Phases;
-use gigalod_format::splats::page::{CODEC_RAW, MAX_NODES};
+use gigalod_format::splats::codec::{self, Model, Statistics};
+use gigalod_format::splats::page::{CODEC_ENTROPY, CODEC_RAW, MAX_NODES};
 use gigalod_format::splats::{Children, Node, PageContents, PageId, PageRecord, Skeleton, WordIndex};
 use gigalod_format::{Kind, LevelSummary, Writer};
 use gigalod_geom::color::{rgb565_of_srgb8, srgb8_of_linear};
+use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -14,6 +16,7 @@ use std::io::{self, BufWriter};
 pub(super) struct Written<'a> {
     pub(super) writer: Writer<BufWriter<&'a File>>,
     pub(super) pages: Vec<PageRecord>,
+    pub(super) model: Option<Model>,
     pub(super) nodes: u64,
     pub(super) leaves: u64,
     pub(super) levels: Vec<LevelSummary>,
@@ -50,16 +53,51 @@ pub(super) fn write<'a>(
         }
         phases.at(pager.nodes);
     }
-    let Pager { finished, records, levels, nodes, leaves, .. } = pager.finish();
+    let Pager { finished, mut records, mut levels, nodes, leaves, nodes_of_levels, .. } = pager.finish();
     let pointers: u64 = records.iter().map(|page| u64::from(page.words - page.nodes)).sum();
-    let raw_bytes = finished.iter().map(|page| page.len() as u64).sum::<u64>() + pointers * 2;
+    let raw_bytes: u64 = finished.iter().map(|page| page.raw_bytes() as u64).sum::<u64>() + pointers * 2;
 
-    let skeleton_bytes = Skeleton::encoded_bytes(records.len() as u64);
+    let (model, coded) = code(&finished);
+    let skeleton_bytes = Skeleton::encoded_bytes(records.len() as u64, model.as_ref());
     let mut writer = Writer::new(BufWriter::with_capacity(1 << 20, file), Kind::Splats, skeleton_bytes)?;
-    for page in &finished {
-        writer.page(page)?;
+    for ((record, (codec, bytes)), nodes_of_level) in records.iter_mut().zip(coded).zip(nodes_of_levels) {
+        record.bytes = bytes.len() as u32;
+        record.checksum = gigalod_format::checksum(&bytes);
+        record.codec = codec;
+        for (level, count) in nodes_of_level {
+            levels[level].bytes += bytes.len() as u64 * count / u64::from(record.nodes);
+        }
+        writer.page(&bytes)?;
     }
-    Ok(Written { writer, pages: records, nodes, leaves, levels, raw_bytes })
+    Ok(Written { writer, pages: records, model, nodes, leaves, levels, raw_bytes })
+}
+
+/// Bytes of all pages, each by the codec that makes it smaller, and the model; none where it would not pay for itself.
+fn code(pages: &[PageContents]) -> (Option<Model>, Vec<(u8, Vec<u8>)>) {
+    let statistics = pages
+        .par_iter()
+        .fold(Statistics::default, |mut statistics, page| {
+            codec::count(page, &mut statistics);
+            statistics
+        })
+        .reduce(Statistics::default, |mut sum, statistics| {
+            sum.add(&statistics);
+            sum
+        });
+    let model = Model::of(&statistics);
+    let coded: Vec<(u8, Vec<u8>)> = pages
+        .par_iter()
+        .map(|page| {
+            let bytes = codec::encode(page, &model);
+            if bytes.len() < page.raw_bytes() { (CODEC_ENTROPY, bytes) } else { (CODEC_RAW, page.encode()) }
+        })
+        .collect();
+    let saved: usize = pages.iter().zip(&coded).map(|(page, (_, bytes))| page.raw_bytes() - bytes.len()).sum();
+    if saved > model.to_bytes().len() {
+        (Some(model), coded)
+    } else {
+        (None, pages.iter().map(|page| (CODEC_RAW, page.encode())).collect())
+    }
 }
 
 /// Packs families into pages.
@@ -73,10 +111,11 @@ struct Pager {
     /// Nodes of `contents` on each level.
     nodes_of_level: Vec<(usize, u64)>,
 
-    /// Bytes of the pages that are full, with a record and a first family each.
-    finished: Vec<Vec<u8>>,
+    /// Pages that are full, with a record, a first family and nodes on each level.
+    finished: Vec<PageContents>,
     records: Vec<PageRecord>,
     first_families: Vec<Option<u64>>,
+    nodes_of_levels: Vec<Vec<(usize, u64)>>,
     /// Where each family begins.
     starts: Vec<(PageId, WordIndex)>,
     levels: Vec<LevelSummary>,
@@ -130,22 +169,18 @@ impl Pager {
     }
 
     fn end_page(&mut self) {
-        let bytes = self.contents.encode();
         self.records.push(PageRecord {
-            bytes: bytes.len() as u32,
-            checksum: gigalod_format::checksum(&bytes),
+            bytes: 0,
+            checksum: 0,
             first_child_page: PageId(0),
             first_child_word: WordIndex(0),
             nodes: self.contents.nodes.len() as u16,
             words: self.words,
             codec: CODEC_RAW,
         });
-        for (level, count) in self.nodes_of_level.drain(..) {
-            self.levels[level].bytes += bytes.len() as u64 * count / self.contents.nodes.len() as u64;
-        }
+        self.nodes_of_levels.push(std::mem::take(&mut self.nodes_of_level));
         self.first_families.push(self.first_family.take());
-        self.finished.push(bytes);
-        self.contents.clear();
+        self.finished.push(std::mem::take(&mut self.contents));
         self.words = 0;
     }
 

@@ -66,8 +66,8 @@ pub fn build(
     drop(leaves);
 
     phases.begin("write", tree.len() as u64);
-    let layout::Written { writer, pages, nodes, leaves, levels, raw_bytes } =
-        layout::write(&tree, has_colors, output.file(), &phases).map_err(BuildError::Output)?;
+    let layout::Written { writer, pages, model, nodes, leaves, levels, raw_bytes } =
+        workers.install(|| layout::write(&tree, has_colors, output.file(), &phases)).map_err(BuildError::Output)?;
     let root = Root {
         origin,
         sphere: tree[0].sphere,
@@ -84,7 +84,7 @@ pub fn build(
     if has_colors {
         attributes.push("colors".into());
     }
-    let skeleton = Skeleton::encode(&root, &pages);
+    let skeleton = Skeleton::encode(&root, &pages, model.as_ref());
     let metadata = Metadata {
         generator: concat!("gigalod ", env!("CARGO_PKG_VERSION")).into(),
         input: counts,

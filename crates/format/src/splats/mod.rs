@@ -8,6 +8,7 @@
 //!
 //! Source: the splats paper, sections 3.1 and 3.2.
 
+pub mod codec;
 pub mod node;
 pub mod page;
 pub mod skeleton;

@@ -9,6 +9,7 @@
 //! as many children as the group has that its pointer leads to; where that is a lie, a traversal can take a node for a
 //! pointer, so it must count what it visits.
 
+use super::codec;
 use super::node::Node;
 use super::skeleton::{PageId, PageRecord, Skeleton};
 use crate::FormatError;
@@ -19,6 +20,8 @@ pub const MAX_NODES: usize = 8192;
 
 /// Nodes and colours as stored.
 pub const CODEC_RAW: u8 = 0;
+/// Entropy-coded under the file's model: [`codec`].
+pub const CODEC_ENTROPY: u8 = 1;
 
 /// Index of a word (node or pointer) in a decoded page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -64,9 +67,14 @@ impl PageContents {
         self.colors.clear();
     }
 
+    /// Length of [`PageContents::encode`].
+    pub fn raw_bytes(&self) -> usize {
+        4 + self.group_sizes.len().div_ceil(4) + self.nodes.len() * 4 + self.colors.len() * 2
+    }
+
     /// The bytes of a raw page.
     pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(8 + self.group_sizes.len() / 4 + self.nodes.len() * 4 + self.colors.len() * 2);
+        let mut out = Vec::with_capacity(self.raw_bytes());
         out.extend((self.group_sizes.len() as u32).to_le_bytes());
         out.extend(
             self.group_sizes
@@ -78,15 +86,28 @@ impl PageContents {
         out
     }
 
+    /// The bytes of a page as they stand in a file, by whatever codec its record names.
+    ///
+    /// # Errors
+    /// [`FormatError::Invalid`] where they make no page of as many nodes as the record says.
+    pub fn decode(bytes: &[u8], skeleton: &Skeleton, page: PageId) -> Result<Self, FormatError> {
+        let (record, has_colors) = (skeleton.record(page), skeleton.root().has_colors);
+        match (record.codec, skeleton.model()) {
+            (CODEC_RAW, _) => Self::decode_raw(bytes, record, has_colors, page),
+            (CODEC_ENTROPY, Some(model)) => codec::decode(bytes, model, record, has_colors, page),
+            (CODEC_ENTROPY, None) => {
+                Err(FormatError::invalid(format!("page {page}"), "codec 1, but the file has no model"))
+            }
+            (codec, _) => Err(FormatError::invalid(format!("page {page}"), format!("codec {codec}, expected 0 or 1"))),
+        }
+    }
+
     /// Undoes [`PageContents::encode`].
     ///
     /// # Errors
     /// [`FormatError::Invalid`] where sizes do not add up.
-    pub fn decode(bytes: &[u8], record: &PageRecord, has_colors: bool, page: PageId) -> Result<Self, FormatError> {
+    pub fn decode_raw(bytes: &[u8], record: &PageRecord, has_colors: bool, page: PageId) -> Result<Self, FormatError> {
         let invalid = |problem: String| FormatError::invalid(format!("page {page}"), problem);
-        if record.codec != CODEC_RAW {
-            return Err(invalid(format!("codec {}, expected 0 (raw)", record.codec)));
-        }
         let nodes = usize::from(record.nodes);
         let Some((group_count, rest)) = bytes.split_first_chunk() else {
             return Err(invalid(format!("{} bytes, expected at least 4", bytes.len())));
@@ -119,8 +140,7 @@ impl Page {
     /// # Errors
     /// [`FormatError::Invalid`]: expected and found.
     pub fn decode(bytes: &[u8], skeleton: &Skeleton, page: PageId) -> Result<Self, FormatError> {
-        let record = skeleton.record(page);
-        let contents = PageContents::decode(bytes, record, skeleton.root().has_colors, page)?;
+        let contents = PageContents::decode(bytes, skeleton, page)?;
         Self::link(&contents, skeleton, page)
     }
 

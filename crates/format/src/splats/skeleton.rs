@@ -1,5 +1,7 @@
-//! The skeleton of a splat file: its root sphere, its counts, and a record for each page, coarse pages first.
+//! The skeleton of a splat file: its root sphere, its counts, a record for each page, coarse pages first, and the model that
+//! entropy-coded pages need.
 
+use super::codec::Model;
 use super::page::{self, WordIndex};
 use crate::FormatError;
 use crate::bytes::Fields;
@@ -69,6 +71,7 @@ pub struct Skeleton {
     pages: Vec<PageRecord>,
     /// Where each page begins in the file.
     offsets: Vec<u64>,
+    model: Option<Model>,
 }
 
 const ROOT_BYTES: usize = 128;
@@ -79,13 +82,15 @@ const Z_UP: u32 = 4;
 
 impl Skeleton {
     /// Length on disk of the skeleton of so many pages.
-    pub fn encoded_bytes(page_count: u64) -> u64 {
-        ROOT_BYTES as u64 + RECORD_BYTES as u64 * page_count
+    pub fn encoded_bytes(page_count: u64, model: Option<&Model>) -> u64 {
+        let model_bytes = model.map_or(0, |model| model.to_bytes().len() as u64);
+        ROOT_BYTES as u64 + RECORD_BYTES as u64 * page_count + model_bytes
     }
 
-    /// The bytes of a skeleton.
-    pub fn encode(root: &Root, pages: &[PageRecord]) -> Vec<u8> {
-        let mut out = Vec::with_capacity(Self::encoded_bytes(pages.len() as u64) as usize);
+    /// The bytes of a skeleton. `model` is what coded the pages, if any are coded.
+    pub fn encode(root: &Root, pages: &[PageRecord], model: Option<&Model>) -> Vec<u8> {
+        let model = model.map(Model::to_bytes).unwrap_or_default();
+        let mut out = Vec::with_capacity(ROOT_BYTES + RECORD_BYTES * pages.len() + model.len());
         out.extend(root.origin.to_array().iter().flat_map(|x| x.to_le_bytes()));
         out.extend(root.sphere.center.to_array().iter().flat_map(|x| x.to_le_bytes()));
         out.extend(root.sphere.radius.to_le_bytes());
@@ -96,13 +101,14 @@ impl Skeleton {
         let flag = |set: bool, bit: u32| if set { bit } else { 0 };
         let flags = flag(root.has_colors, HAS_COLORS) | flag(root.closed, CLOSED) | flag(root.up == UpAxis::Z, Z_UP);
         out.extend(flags.to_le_bytes());
-        out.extend(0u32.to_le_bytes());
+        out.extend((model.len() as u32).to_le_bytes());
         debug_assert_eq!(out.len(), ROOT_BYTES);
         for page in pages {
             out.extend([page.bytes, page.checksum, page.first_child_page.0].iter().flat_map(|x| x.to_le_bytes()));
             out.extend([page.first_child_word.0, page.nodes, page.words].iter().flat_map(|x| x.to_le_bytes()));
             out.extend([page.codec, 0]);
         }
+        out.extend(model);
         out
     }
 
@@ -122,7 +128,7 @@ impl Skeleton {
         let (radius, overhang) = (fields.f32(), fields.f32());
         let bounds = Aabb { min: vector(&mut fields), max: vector(&mut fields) };
         let (nodes, leaves, page_count) = (fields.u64(), fields.u64(), fields.u64());
-        let (levels, flags, _reserved) = (fields.u32(), fields.u32(), fields.u32());
+        let (levels, flags, model_bytes) = (fields.u32(), fields.u32(), fields.u32());
         if !origin.is_finite() || !bounds.min.is_finite() || !bounds.max.is_finite() || bounds.is_empty() {
             return Err(invalid(format!(
                 "an origin at {origin} and bounds from {} to {}, expected finite numbers, the smaller first",
@@ -134,7 +140,9 @@ impl Skeleton {
                 "a root sphere at {center} with radius {radius} and overhang {overhang}, expected finite numbers, a radius ≥ 0, an overhang of 1–64"
             )));
         }
-        let record_bytes = bytes.len() - ROOT_BYTES;
+        let Some(record_bytes) = (bytes.len() - ROOT_BYTES).checked_sub(model_bytes as usize) else {
+            return Err(invalid(format!("a model of {model_bytes} bytes in {} bytes of skeleton", bytes.len())));
+        };
         let whole = record_bytes.is_multiple_of(RECORD_BYTES) && (record_bytes / RECORD_BYTES) as u64 == page_count;
         if !whole || !(1..=u64::from(u32::MAX)).contains(&page_count) {
             return Err(invalid(format!("{page_count} pages in {} bytes of skeleton", bytes.len())));
@@ -186,12 +194,18 @@ impl Skeleton {
         if !(1..=nodes).contains(&leaves) || !(1..=nodes).contains(&u64::from(levels)) {
             return Err(invalid(format!("{leaves} leaves on {levels} levels, expected 1–{nodes} of each")));
         }
-        Ok(Self { root, pages, offsets })
+        let model = if model_bytes > 0 { Some(Model::parse(&bytes[ROOT_BYTES + record_bytes..])?) } else { None };
+        Ok(Self { root, pages, offsets, model })
     }
 
     /// What holds for the whole hierarchy.
     pub fn root(&self) -> &Root {
         &self.root
+    }
+
+    /// What entropy-coded pages are decoded with; none where all pages are raw.
+    pub fn model(&self) -> Option<&Model> {
+        self.model.as_ref()
     }
 
     /// All page records, coarse first.

@@ -166,7 +166,7 @@ impl Tree {
             encoded.push(bytes);
         }
 
-        let skeleton = Skeleton::encode(root, &records);
+        let skeleton = Skeleton::encode(root, &records, None);
         let mut writer = Writer::new(Cursor::new(Vec::new()), Kind::Splats, skeleton.len() as u64).unwrap();
         for page in &encoded {
             writer.page(page).unwrap();

@@ -31,8 +31,25 @@ pub struct Relative {
     pub scale: f32,
 }
 
+/// The sub-cube of a code: its edge in cells, 1–13, and its lower corner, each coordinate 0 to 13 less the edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cells {
+    /// Edge.
+    pub edge: u8,
+    /// Lower corner.
+    pub corner: [u8; 3],
+}
+
+impl Cells {
+    /// Twice the centre's offset from the parent's centre on an axis, in cells: −12 to 12.
+    pub fn doubled_offset(self, axis: usize) -> i32 {
+        2 * i32::from(self.corner[axis]) + i32::from(self.edge) - GRID as i32
+    }
+}
+
 struct Tables {
     relative: Vec<Relative>,
+    cells: Vec<Cells>,
     /// Code of each sub-cube by (s, x, y, z), or `NONE`.
     code: Vec<u16>,
     /// Where the sub-cubes of edge s begin in `code`.
@@ -42,7 +59,8 @@ struct Tables {
 const NONE: u16 = u16::MAX;
 
 static TABLES: LazyLock<Tables> = LazyLock::new(|| {
-    let mut tables = Tables { relative: Vec::with_capacity(CODES), code: Vec::new(), first: [0; GRID + 1] };
+    let mut tables =
+        Tables { relative: Vec::with_capacity(CODES), cells: Vec::new(), code: Vec::new(), first: [0; GRID + 1] };
     for s in 1..=GRID {
         tables.first[s] = tables.code.len();
         let places = GRID + 1 - s;
@@ -54,6 +72,7 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
             let reach = GRID as f64 + 3f64.sqrt() * s as f64;
             tables.code.push(if squared as f64 <= reach * reach { tables.relative.len() as u16 } else { NONE });
             if squared as f64 <= reach * reach {
+                tables.cells.push(Cells { edge: s as u8, corner: corner.map(|at| at as u8) });
                 tables.relative.push(Relative {
                     offset: Vec3::from_array(center.map(|c| c as f32 / GRID as f32)),
                     scale: s as f32 / GRID as f32,
@@ -67,6 +86,25 @@ static TABLES: LazyLock<Tables> = LazyLock::new(|| {
 /// All codes' spheres relative to a unit parent, in code order.
 pub fn table() -> &'static [Relative] {
     &TABLES.relative
+}
+
+/// The sub-cubes of all codes, in code order.
+pub fn cells_table() -> &'static [Cells] {
+    &TABLES.cells
+}
+
+/// The code of a sub-cube; `None` where it does not touch the parent, or is no sub-cube at all.
+pub fn code_of(cells: Cells) -> Option<u16> {
+    let edge = usize::from(cells.edge);
+    if !(1..=GRID).contains(&edge) {
+        return None;
+    }
+    let places = GRID + 1 - edge;
+    let [x, y, z] = cells.corner.map(usize::from);
+    if x.max(y).max(z) >= places {
+        return None;
+    }
+    Some(TABLES.code[TABLES.first[edge] + (x * places + y) * places + z]).filter(|code| *code != NONE)
 }
 
 /// The child sphere that `code` stands for. Codes beyond the last stand for the parent itself.
@@ -119,6 +157,20 @@ mod tests {
         assert_eq!(table().len(), CODES);
         assert_eq!(table()[usize::from(SELF)], Relative { offset: Vec3::ZERO, scale: 1.0 });
         assert!(TABLES.code.len() == 8281 && TABLES.code.iter().filter(|code| **code != NONE).count() == 7621);
+    }
+
+    #[test]
+    fn each_code_has_the_sub_cube_that_has_the_code() {
+        for (code, cells) in cells_table().iter().enumerate() {
+            assert_eq!(code_of(*cells), Some(code as u16));
+            for axis in 0..3 {
+                let offset = f64::from(cells.doubled_offset(axis)) / 13.0;
+                assert!((offset - f64::from(table()[code].offset[axis])).abs() < 1e-6);
+            }
+        }
+        for (edge, corner) in [(0, [0; 3]), (14, [0; 3]), (13, [1, 0, 0]), (1, [0, 0, 0]), (255, [255; 3])] {
+            assert_eq!(code_of(Cells { edge, corner }), None);
+        }
     }
 
     #[test]

@@ -86,11 +86,10 @@ impl Walk<'_> {
             return false;
         }
         let record = *self.file.skeleton().record(page);
-        let has_colors = self.file.skeleton().root().has_colors;
         let mut bytes = vec![0; record.bytes as usize];
         let read = self.file.container().store().read_at(self.file.skeleton().page_offset(page), &mut bytes);
         let contents = match read {
-            Ok(()) => PageContents::decode(&bytes, &record, has_colors, page),
+            Ok(()) => PageContents::decode(&bytes, self.file.skeleton(), page),
             Err(source) => {
                 self.problems.add(|| format!("page {page}: {source}"));
                 return false;
