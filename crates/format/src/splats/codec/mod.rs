@@ -20,7 +20,7 @@ use walk::{Coder, walk};
 
 impl Coder for Decoder<'_> {
     #[inline(always)]
-    fn symbol(&mut self, context: usize, _symbol: u8) -> Option<u8> {
+    fn symbol(&mut self, context: usize, _given: impl FnOnce() -> u8) -> Option<u8> {
         Decoder::symbol(self, context)
     }
 }
@@ -29,7 +29,8 @@ impl Coder for Decoder<'_> {
 pub fn count(contents: &PageContents, statistics: &mut Statistics) {
     struct Counting<'a>(&'a mut Statistics);
     impl Coder for Counting<'_> {
-        fn symbol(&mut self, context: usize, symbol: u8) -> Option<u8> {
+        fn symbol(&mut self, context: usize, given: impl FnOnce() -> u8) -> Option<u8> {
+            let symbol = given();
             self.0.count(context, symbol);
             Some(symbol)
         }
@@ -41,7 +42,8 @@ pub fn count(contents: &PageContents, statistics: &mut Statistics) {
 pub fn encode(contents: &PageContents, model: &Model) -> Vec<u8> {
     struct Listing(Vec<(u16, u8)>);
     impl Coder for Listing {
-        fn symbol(&mut self, context: usize, symbol: u8) -> Option<u8> {
+        fn symbol(&mut self, context: usize, given: impl FnOnce() -> u8) -> Option<u8> {
+            let symbol = given();
             self.0.push((context as u16, symbol));
             Some(symbol)
         }
@@ -71,7 +73,7 @@ pub fn decode(
     page: PageId,
 ) -> Result<PageContents, FormatError> {
     let mut contents = PageContents::default();
-    let whole = Decoder::new(bytes, model.tables()).is_some_and(|mut decoder| {
+    let whole = Decoder::new(bytes, model.slots()).is_some_and(|mut decoder| {
         walk(&mut decoder, None, usize::from(record.nodes), has_colors, &mut contents).is_some() && decoder.is_at_end()
     });
     if whole { Ok(contents) } else { Err(FormatError::invalid(format!("page {page}"), "its code makes no sense")) }

@@ -3,19 +3,20 @@
 //! One model serves all pages of a file; it lies in the skeleton, so each page decodes by itself. The contexts are part of the
 //! format: `docs/format.md` lists them in this order.
 
-use super::rans::{SYMBOLS, Table};
+use super::rans::{SYMBOLS, Slots, Table};
 use crate::FormatError;
 
 /// The first context of each field; each field's contexts are numbered from there.
 pub(super) mod first {
     /// Size of a group less one. By the size of the group before (0 at the beginning).
     pub(crate) const GROUP: usize = 0;
-    /// Tree bits. By place in the group (0–3) and what the node before it in the group is: none, a leaf, an inner node.
-    pub(crate) const TREE: usize = GROUP + 5;
-    /// Width of the cone. By leaf or not, and the cone before.
-    pub(crate) const CONE: usize = TREE + 4 * 3;
+    /// Tree bits, and the cone of a leaf. By place in the group (0–3), what the node before it in the group is (none, a leaf,
+    /// an inner node), and the cone before.
+    pub(crate) const KIND: usize = GROUP + 5;
+    /// Cone of an inner node. By the cone before.
+    pub(crate) const CONE: usize = KIND + 4 * 3 * 4;
     /// Column of the normal, as a difference. By cone, and first of its group or not.
-    pub(crate) const COLUMN: usize = CONE + 2 * 4;
+    pub(crate) const COLUMN: usize = CONE + 4;
     /// Row of the normal, as a difference. By cone, first or not, and size of the column's difference.
     pub(crate) const ROW: usize = COLUMN + 4 * 2;
     /// Edge of the sphere's sub-cube less one. By leaf or not, and the edge before it in the group (0 for none).
@@ -67,10 +68,19 @@ impl Statistics {
 }
 
 /// Probabilities of all symbols in all contexts.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Model {
     tables: Vec<Table>,
+    slots: Slots,
 }
+
+impl PartialEq for Model {
+    fn eq(&self, other: &Self) -> bool {
+        self.tables == other.tables
+    }
+}
+
+impl Eq for Model {}
 
 impl Model {
     /// The model that codes what was counted in the fewest bits.
@@ -80,7 +90,11 @@ impl Model {
 
     fn with(mut tables: Vec<Table>) -> Self {
         tables.push(Table::uniform());
-        Self { tables }
+        Self { slots: Slots::of(&tables), tables }
+    }
+
+    pub(super) fn slots(&self) -> &Slots {
+        &self.slots
     }
 
     pub(super) fn tables(&self) -> &[Table] {
@@ -113,7 +127,7 @@ impl Model {
     /// Undoes [`Model::to_bytes`].
     ///
     /// # Errors
-    /// [`FormatError::Invalid`] where the bytes end early or late, or frequencies do not sum to 4096.
+    /// [`FormatError::Invalid`] where the bytes end early or late, or frequencies do not sum to 1024.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
         let mut rest = bytes.iter().copied();
         let mut byte = || {
@@ -135,7 +149,7 @@ impl Model {
                     if low < 128 { low } else { low - 128 + (u32::from(byte()?) << 7) }
                 };
                 if value == 0 || value > left {
-                    let problem = format!("context {context} has frequencies that sum to more than 4096, or one of 0");
+                    let problem = format!("context {context} has frequencies that sum to more than 1024, or one of 0");
                     return Err(FormatError::invalid("the model", problem));
                 }
                 left -= value;

@@ -1,4 +1,4 @@
-//! A static range coder over small alphabets: two interleaved rANS states, 12-bit probabilities, 16-bit words.
+//! A static range coder over small alphabets: two interleaved rANS states, 10-bit probabilities, 16-bit words.
 //!
 //! Symbols are 0–15, each coded under one of many [`Table`]s. The two states take turns, symbol by symbol, so that a decoder
 //! can work on both at once. The coder works backwards, so the decoder reads forwards.
@@ -9,8 +9,8 @@
 //! Source: Duda, *Asymmetric numeral systems*, arXiv:1311.2540, 2013; interleaving as in Giesen, *Interleaved entropy coders*,
 //! arXiv:1402.3392, 2014.
 
-/// Bits of a probability.
-pub(super) const SCALE_BITS: u32 = 12;
+/// Bits of a probability. With 12 a file is 0.3 % smaller, but the decoder's tables leave the cache.
+pub(super) const SCALE_BITS: u32 = 10;
 /// The whole.
 pub(super) const SCALE: u32 = 1 << SCALE_BITS;
 /// Symbols of an alphabet.
@@ -21,9 +21,8 @@ const LOW: u32 = 1 << 16;
 /// Probabilities of the symbols in one context, as running sums: symbol i has the slots from `ends[i − 1]` up to `ends[i]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Table {
-    /// Not falling; the last is [`SCALE`], except in a context that never occurs, where all are 0. Signed, because that is what
-    /// vector units compare.
-    ends: [i16; SYMBOLS],
+    /// Not falling; the last is [`SCALE`], except in a context that never occurs, where all are 0.
+    ends: [u16; SYMBOLS],
 }
 
 impl Table {
@@ -32,7 +31,7 @@ impl Table {
 
     /// All symbols alike.
     pub(super) fn uniform() -> Self {
-        Self { ends: std::array::from_fn(|symbol| ((symbol + 1) * SCALE as usize / SYMBOLS) as i16) }
+        Self { ends: std::array::from_fn(|symbol| ((symbol + 1) * SCALE as usize / SYMBOLS) as u16) }
     }
 
     /// From frequencies that sum to [`SCALE`] (or all 0).
@@ -44,7 +43,7 @@ impl Table {
             if sum > SCALE {
                 return None;
             }
-            *end = sum as i16;
+            *end = sum as u16;
         }
         (sum == SCALE || sum == 0).then_some(Self { ends })
     }
@@ -83,18 +82,30 @@ impl Table {
     }
 
     fn end(&self, symbol: usize) -> u32 {
-        self.ends[symbol] as u32
+        u32::from(self.ends[symbol])
     }
+}
 
-    /// The symbol whose slots hold `slot`; 16 in an unused context.
-    #[inline(always)]
-    fn symbol_at(&self, slot: u32) -> usize {
-        let slot = slot as i16;
-        let mut symbol = 0i16;
-        for end in self.ends {
-            symbol += i16::from(end <= slot);
+/// What a decoder looks up: for each context and slot the symbol, and the numbers that take the state back.
+#[derive(Clone, Debug)]
+pub(super) struct Slots {
+    /// `symbol << 22 | frequency << 10 | (slot − start)`; 0, a frequency of 0, in contexts that never occur.
+    entries: Vec<u32>,
+}
+
+impl Slots {
+    pub(super) fn of(tables: &[Table]) -> Self {
+        let mut entries = vec![0; tables.len() << SCALE_BITS];
+        for (entries, table) in entries.chunks_exact_mut(SCALE as usize).zip(tables) {
+            for symbol in 0..SYMBOLS {
+                let (start, end) = (table.start(symbol), table.end(symbol));
+                for slot in start..end {
+                    entries[slot as usize] =
+                        (symbol as u32) << (2 * SCALE_BITS + 2) | (end - start) << SCALE_BITS | (slot - start);
+                }
+            }
         }
-        symbol as usize
+        Self { entries }
     }
 }
 
@@ -123,37 +134,35 @@ pub(super) struct Decoder<'a> {
     /// Whose turn it is comes first.
     states: [u32; 2],
     words: &'a [[u8; 2]],
-    tables: &'a [Table],
+    slots: &'a Slots,
 }
 
 impl<'a> Decoder<'a> {
     /// `None` where the bytes are too few or odd.
-    pub(super) fn new(bytes: &'a [u8], tables: &'a [Table]) -> Option<Self> {
+    pub(super) fn new(bytes: &'a [u8], slots: &'a Slots) -> Option<Self> {
         let (a, rest) = bytes.split_first_chunk()?;
         let (b, rest) = rest.split_first_chunk()?;
         let (words, []) = rest.as_chunks() else { return None };
-        Some(Self { states: [u32::from_le_bytes(*a), u32::from_le_bytes(*b)], words, tables })
+        Some(Self { states: [u32::from_le_bytes(*a), u32::from_le_bytes(*b)], words, slots })
     }
 
     /// The next symbol; `None` where there cannot be one.
     #[inline(always)]
     pub(super) fn symbol(&mut self, context: usize) -> Option<u8> {
-        let table = &self.tables[context];
         let state = self.states[0];
-        let slot = state & (SCALE - 1);
-        let symbol = table.symbol_at(slot);
-        if symbol >= SYMBOLS {
+        let entry = self.slots.entries[context << SCALE_BITS | (state & (SCALE - 1)) as usize];
+        let frequency = entry >> SCALE_BITS & (2 * SCALE - 1);
+        if frequency == 0 {
             return None;
         }
-        let start = table.start(symbol);
-        let mut next = (table.end(symbol) - start) * (state >> SCALE_BITS) + slot - start;
+        let mut next = frequency * (state >> SCALE_BITS) + (entry & (SCALE - 1));
         if next < LOW {
             let (word, rest) = self.words.split_first()?;
             self.words = rest;
             next = next << 16 | u32::from(u16::from_le_bytes(*word));
         }
         self.states = [self.states[1], next];
-        Some(symbol as u8)
+        Some((entry >> (2 * SCALE_BITS + 2)) as u8)
     }
 
     /// True when everything was read and nothing is left.
@@ -179,7 +188,8 @@ mod tests {
             let tables = counts.map(|counts| Table::of_counts(&counts));
             let mut bytes = Vec::new();
             encode(&symbols, &tables, &mut bytes);
-            let mut decoder = Decoder::new(&bytes, &tables).unwrap();
+            let slots = Slots::of(&tables);
+            let mut decoder = Decoder::new(&bytes, &slots).unwrap();
             for (context, symbol) in &symbols {
                 prop_assert_eq!(decoder.symbol(usize::from(*context)), Some(*symbol));
             }
@@ -189,7 +199,8 @@ mod tests {
         #[test]
         fn any_bytes_decode_to_symbols_or_to_an_end(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let tables = [Table::uniform(), Table::UNUSED];
-            if let Some(mut decoder) = Decoder::new(&bytes, &tables) {
+            let slots = Slots::of(&tables);
+            if let Some(mut decoder) = Decoder::new(&bytes, &slots) {
                 prop_assert!((0..300).all(|_| decoder.symbol(0).is_none_or(|symbol| symbol < 16)));
                 prop_assert_eq!(decoder.symbol(1), None);
             }

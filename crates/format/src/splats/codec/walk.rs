@@ -8,8 +8,9 @@ use sphere::Cells;
 
 /// Counts, codes or decodes one symbol after the other.
 pub(super) trait Coder {
-    /// Given the symbol (when counting and coding) or anything (when decoding), returns the symbol. `None` ends the walk.
-    fn symbol(&mut self, context: usize, symbol: u8) -> Option<u8>;
+    /// The next symbol, coded in `context`. `given` computes it from the known page; a decoder, who knows no page, does not ask.
+    /// `None` ends the walk.
+    fn symbol(&mut self, context: usize, given: impl FnOnce() -> u8) -> Option<u8>;
 }
 
 /// A difference too large for one symbol; the value itself follows.
@@ -31,8 +32,8 @@ pub(super) fn walk<C: Coder>(
     let mut before = Before::default();
     let mut group_at = 0;
     while out.nodes.len() < node_count {
-        let given_size = given.map_or(1, |page| page.group_sizes[group_at]);
-        let size = coder.symbol(first::GROUP + usize::from(before.group_size), given_size - 1)? + 1;
+        let given_size = || given.map_or(0, |page| page.group_sizes[group_at] - 1);
+        let size = coder.symbol(first::GROUP + usize::from(before.group_size), given_size)? + 1;
         if size > 4 || out.nodes.len() + usize::from(size) > node_count {
             return None;
         }
@@ -101,12 +102,9 @@ impl MeanNormal {
 
     /// Face, column and row that are most likely next.
     fn guess(&self) -> [i32; 3] {
-        let mean = |sum: i32| match self.count {
-            0 | 1 => sum,
-            2 => (sum + 1) >> 1,
-            3 => (sum * 2 + 3) / 6,
-            _ => (sum + 2) >> 2,
-        };
+        // Rounded sums over 1, 2, 3 and 4, as products with 2^16 over the number.
+        const SHARE: [i32; 5] = [1 << 16, 1 << 16, 1 << 15, 21_846, 1 << 14];
+        let mean = |sum: i32| (sum * SHARE[self.count as usize] + (1 << 15)) >> 16;
         [self.face, mean(self.column), mean(self.row)]
     }
 
@@ -121,24 +119,32 @@ impl MeanNormal {
     }
 }
 
+#[inline(always)]
 fn node<C: Coder>(coder: &mut C, tables: &Tables, before: &mut Before, place: usize, given: Node) -> Option<Node> {
-    // Tree bits: 0 a leaf, 1–3 with 2–4 children, 4–6 likewise and all of them leaves.
-    let children = given.children();
-    let code = children.count.saturating_sub(1) + if children.all_leaves { 3 } else { 0 };
-    let code = coder.symbol(first::TREE + place * 3 + before.tree, code)?;
-    let children = match code {
-        0 => Children::NONE,
-        1..=3 => Children { count: code + 1, all_leaves: false },
-        4..=6 => Children { count: code - 2, all_leaves: true },
-        _ => return None,
+    // 0–3 a leaf with that cone; 4–6 an inner node with 2–4 children; 7–9 likewise, and all of them are leaves.
+    let kind = || {
+        let children = given.children();
+        match children.count {
+            0 => given.cone(),
+            count => count + if children.all_leaves { 5 } else { 2 },
+        }
     };
-    let inner = usize::from(children.count > 0);
-    before.tree = 1 + inner;
-
-    let cone = coder.symbol(first::CONE + inner * 4 + usize::from(before.cone), given.cone())?;
+    let kind = coder.symbol(first::KIND + (place * 3 + before.tree) * 4 + usize::from(before.cone), kind)?;
+    if kind > 9 {
+        return None;
+    }
+    let inner = usize::from(kind > 3);
+    let (children, cone) = if inner == 0 {
+        (Children::NONE, kind)
+    } else {
+        let all_leaves = kind > 6;
+        let count = kind - if all_leaves { 5 } else { 2 };
+        (Children { count, all_leaves }, coder.symbol(first::CONE + usize::from(before.cone), || given.cone())?)
+    };
     if cone > 3 {
         return None;
     }
+    before.tree = 1 + inner;
     before.cone = cone;
 
     let normal_code = direction(coder, before, place, cone, given.normal())?;
@@ -146,32 +152,37 @@ fn node<C: Coder>(coder: &mut C, tables: &Tables, before: &mut Before, place: us
     Some(Node::pack(sphere_code, normal_code, cone, children))
 }
 
+#[inline(always)]
 fn direction<C: Coder>(coder: &mut C, before: &mut Before, place: usize, cone: u8, given: u16) -> Option<u16> {
     const GRID: i32 = normal::GRID as i32;
     let parts = |code: u16| [i32::from(code) / (GRID * GRID), i32::from(code) % GRID, i32::from(code) / GRID % GRID];
     let guess = before.normal.guess();
-    let given_parts = parts(given);
-    let [column_step, row_step] = [1, 2].map(|part| folded(given_parts[part] - guess[part]));
-    let escapes = given_parts[0] != guess[0] || column_step >= ESCAPE || row_step >= ESCAPE;
+    let step = |part: usize| folded(parts(given)[part] - guess[part]);
+    let column_or_escape = || {
+        let escapes = parts(given)[0] != guess[0] || step(1) >= ESCAPE || step(2) >= ESCAPE;
+        if escapes { ESCAPE } else { step(1) }
+    };
     let context = usize::from(cone) * 2 + usize::from(place > 0);
-    let column_step = coder.symbol(first::COLUMN + context, if escapes { ESCAPE } else { column_step })?;
-    let code = if column_step == ESCAPE {
-        plain(coder, given, 4)?
+    let column_step = coder.symbol(first::COLUMN + context, column_or_escape)?;
+    let (code, parts) = if column_step == ESCAPE {
+        let code = plain(coder, || given, 4)?;
+        (code, parts(code))
     } else {
-        let row_step = coder.symbol(first::ROW + context * 4 + size_class(column_step), row_step)?;
+        let row_step = coder.symbol(first::ROW + context * 4 + size_class(column_step), || step(2))?;
         let (column, row) = (guess[1] + unfolded(column_step), guess[2] + unfolded(row_step));
         if !(0..GRID).contains(&column) || !(0..GRID).contains(&row) {
             return None;
         }
-        ((guess[0] * GRID + row) * GRID + column) as u16
+        (((guess[0] * GRID + row) * GRID + column) as u16, [guess[0], column, row])
     };
     if usize::from(code) >= normal::CODES {
         return None;
     }
-    before.normal.add(parts(code));
+    before.normal.add(parts);
     Some(code)
 }
 
+#[inline(always)]
 fn ball<C: Coder>(
     coder: &mut C,
     tables: &Tables,
@@ -180,8 +191,8 @@ fn ball<C: Coder>(
     normal_code: u16,
     given: u16,
 ) -> Option<u16> {
-    let given = tables.cells[usize::from(given).min(sphere::CODES - 1)];
-    let edge = coder.symbol(first::EDGE + inner * 14 + usize::from(before.edge), given.edge - 1)? + 1;
+    let given = || tables.cells[usize::from(given).min(sphere::CODES - 1)];
+    let edge = coder.symbol(first::EDGE + inner * 14 + usize::from(before.edge), || given().edge - 1)? + 1;
     if edge > sphere::GRID as u8 {
         return None;
     }
@@ -195,10 +206,11 @@ fn ball<C: Coder>(
     let mut cells = Cells { edge, corner: [0; 3] };
     let siblings = |axis: usize| if first_in_group { 0 } else { 1 + side_class(before.offsets[axis]) };
 
-    cells.corner[along_1] = coder.symbol(first::ALONG_1 + by_edge * 6 + siblings(along_1), given.corner[along_1])?;
+    cells.corner[along_1] =
+        coder.symbol(first::ALONG_1 + by_edge * 6 + siblings(along_1), || given().corner[along_1])?;
     let out = (cells.doubled_offset(along_1).unsigned_abs() as usize / 3).min(2);
     let context = (by_edge * 6 + siblings(along_2)) * 3 + out;
-    cells.corner[along_2] = coder.symbol(first::ALONG_2 + context, given.corner[along_2])?;
+    cells.corner[along_2] = coder.symbol(first::ALONG_2 + context, || given().corner[along_2])?;
     if cells.corner[along_1] >= places || cells.corner[along_2] >= places {
         return None;
     }
@@ -209,11 +221,13 @@ fn ball<C: Coder>(
         + normal[along_2] * cells.doubled_offset(along_2) as f32)
         / normal[across];
     let guess = ((on_plane + f32::from(places - 1)) * 0.5).round().clamp(0.0, f32::from(places - 1)) as u8;
-    let step = coder.symbol(first::ACROSS + by_edge * 2 + inner, (given.corner[across] + places - guess) % places)?;
+    let step = || (given().corner[across] + places - guess) % places;
+    let step = coder.symbol(first::ACROSS + by_edge * 2 + inner, step)?;
     if step >= places {
         return None;
     }
-    cells.corner[across] = (guess + step) % places;
+    let corner = guess + step;
+    cells.corner[across] = if corner >= places { corner - places } else { corner };
 
     before.edge = edge;
     for axis in 0..3 {
@@ -237,15 +251,15 @@ fn color<C: Coder>(coder: &mut C, before: &mut Before, place: usize, given: u16)
 
 /// One channel as a difference; returns its value and the symbol.
 fn channel<C: Coder>(coder: &mut C, context: usize, guess: i32, given: i32, max: i32) -> Option<(i32, u8)> {
-    let step = coder.symbol(context, folded(given - guess).min(ESCAPE))?;
-    let value = if step == ESCAPE { i32::from(plain(coder, given as u16, 2)?) } else { guess + unfolded(step) };
+    let step = coder.symbol(context, || folded(given - guess).min(ESCAPE))?;
+    let value = if step == ESCAPE { i32::from(plain(coder, || given as u16, 2)?) } else { guess + unfolded(step) };
     (0..=max).contains(&value).then_some((value, step))
 }
 
 /// So many times four bits as they are, highest first.
-fn plain<C: Coder>(coder: &mut C, given: u16, nibbles: u32) -> Option<u16> {
+fn plain<C: Coder>(coder: &mut C, given: impl Fn() -> u16, nibbles: u32) -> Option<u16> {
     (0..nibbles).rev().try_fold(0, |value, nibble| {
-        Some(value << 4 | u16::from(coder.symbol(first::PLAIN, (given >> (4 * nibble) & 15) as u8)?))
+        Some(value << 4 | u16::from(coder.symbol(first::PLAIN, || (given() >> (4 * nibble) & 15) as u8)?))
     })
 }
 
