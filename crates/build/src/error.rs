@@ -22,15 +22,16 @@ pub enum BuildError {
         /// Longest edge of the bounds.
         extent: f64,
     },
-    /// The budget does not suffice.
-    #[error("{elements} need {needed} of memory, the budget is {budget}")]
-    OverBudget {
-        /// What was read when it became clear.
-        elements: String,
-        /// In bytes, readable.
-        needed: String,
-        /// In bytes, readable.
-        budget: String,
+    /// A temporary file could not be written or read back.
+    #[error("could not use temporary files: {0}")]
+    Scratch(#[source] io::Error),
+    /// What no plane can separate has to be sorted in memory.
+    #[error("{vertices} vertices in one place, expected at most {most} within this budget")]
+    Crowd {
+        /// In one place.
+        vertices: u64,
+        /// That the budget has room for.
+        most: u64,
     },
     /// More than the format's numbers can count.
     #[error("{found} vertices, expected fewer than 2^31")]

@@ -8,6 +8,7 @@ mod error;
 mod output;
 mod progress;
 pub mod splats;
+mod spool;
 
 pub use error::BuildError;
 pub use output::Output;

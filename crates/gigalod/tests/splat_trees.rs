@@ -33,11 +33,11 @@ impl ModelStream for FromMemory {
     }
 
     fn declared_vertices(&self) -> Option<u64> {
-        None
+        Some(self.positions.len() as u64)
     }
 
     fn declared_faces(&self) -> Option<u64> {
-        None
+        Some(self.triangles.len() as u64)
     }
 
     fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
@@ -158,13 +158,32 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn a_budget_that_does_not_suffice_is_an_error_and_no_file() {
+fn bytes_do_not_depend_on_the_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    // 160,000 vertices are several chunks, and far too many for the smallest budgets: those build in files.
+    for side in [150, 400] {
+        let bytes = |memory_bytes: u64| {
+            let out = folder.path().join("out.glod");
+            build(wavy_grid(side), &Options { memory_bytes, ..Options::default() }, &out).unwrap();
+            std::fs::read(&out).unwrap()
+        };
+        let large = bytes(2 << 30);
+        assert!(large == bytes(64 << 20) && large == bytes(8 << 20) && large == bytes(1 << 20), "{side}");
+    }
+}
+
+#[test]
+fn a_tree_of_several_chunks_is_sound() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.glod");
-    let options = Options { memory_bytes: 1 << 20, ..Options::default() };
-    let error = build(wavy_grid(150), &options, &out).unwrap_err();
-    assert!(matches!(error, BuildError::OverBudget { .. }), "{error}");
-    assert!(!out.exists());
+    let grid = wavy_grid(420);
+    let mesh = Mesh::new(grid.positions.clone(), None, None, grid.triangles.clone()).unwrap();
+    build(grid, &Options::default(), &out).unwrap();
+    let file = open(&out);
+    let (tree, problems) = verify::check(&file, &mut |_| {});
+    assert_eq!(problems.told, Vec::<String>::new());
+    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh);
+    assert_eq!(measured.violations, 0, "{measured:?}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use gigalod_geom::quantise::{cone, normal};
 pub(super) struct Costs([u32; 3]);
 
 /// How to take a binary node apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Plan {
     /// Children when it stays: 2–4.
     children: u8,
@@ -21,6 +21,11 @@ pub(super) struct Plan {
     left_of_3: u8,
     /// Of 4 subtrees: how many come from the left child (1–3).
     left_of_4: u8,
+}
+
+impl Plan {
+    /// Of a unit.
+    pub(super) const NONE: Self = Self { children: 0, left_of_3: 0, left_of_4: 0 };
 }
 
 /// No subtree of fewer leaves can be so many siblings. Small enough to add without overflow.
@@ -67,7 +72,7 @@ impl ChildList {
     pub(super) fn of(nodes: &[Binary], index: usize) -> Self {
         let mut list = Self::default();
         let node = &nodes[index];
-        if node.leaves > 1 {
+        if node.units > 1 {
             list.take_apart(nodes, index, node.plan.children);
         }
         list
@@ -87,7 +92,7 @@ impl ChildList {
         };
         let left = index + 1;
         self.take_apart(nodes, left, from_left);
-        self.take_apart(nodes, left + 2 * nodes[left].leaves as usize - 1, into - from_left);
+        self.take_apart(nodes, left + 2 * nodes[left].units as usize - 1, into - from_left);
     }
 
     pub(super) fn as_slice(&self) -> &[u32] {
@@ -99,7 +104,7 @@ impl ChildList {
 pub(super) fn set_cones(nodes: &mut [Binary]) {
     // Backwards through preorder: children before parents. Nodes that are not kept get a cone too; nobody reads it.
     for index in (0..nodes.len()).rev() {
-        if nodes[index].leaves == 1 {
+        if nodes[index].units == 1 {
             continue;
         }
         let axis = normal::decode(nodes[index].normal);

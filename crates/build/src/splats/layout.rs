@@ -1,15 +1,18 @@
-//! Breadth-first layout: families of nodes, level by level, packed into pages, and written.
+//! Breadth-first layout: families of nodes, level by level across all chunks, packed into pages.
+//!
+//! The same walk is taken twice: once to find out how many pages there are and how often each symbol occurs, once to write.
 
+use super::chunk::packed_color;
 use super::contract::ChildList;
-use super::tree::Binary;
+use super::pager::Pager;
+use super::quantise::Quantised;
 use crate::progress::Phases;
+use crate::spool::Spool;
 use gigalod_format::splats::codec::{self, Model, Statistics};
-use gigalod_format::splats::page::{CODEC_ENTROPY, CODEC_RAW, MAX_NODES};
-use gigalod_format::splats::{Children, Node, PageContents, PageId, PageRecord, Skeleton, WordIndex};
+use gigalod_format::splats::page::{CODEC_ENTROPY, CODEC_RAW};
+use gigalod_format::splats::{Node, PageContents, PageRecord, Skeleton};
 use gigalod_format::{Kind, LevelSummary, Writer};
-use gigalod_geom::color::{rgb565_of_srgb8, srgb8_of_linear};
 use rayon::prelude::*;
-use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, BufWriter};
 
@@ -25,180 +28,239 @@ pub(super) struct Written<'a> {
     pub(super) raw_bytes: u64,
 }
 
-/// Writes all pages of the quantised tree.
+/// Pages that are coded side by side.
+const PAGES_AT_ONCE: usize = 32;
+
+/// Writes all pages.
 pub(super) fn write<'a>(
-    nodes: &[Binary],
-    has_colors: bool,
+    quantised: &Quantised,
+    colors: &Spool<u16>,
     file: &'a File,
     phases: &Phases<'_>,
 ) -> io::Result<Written<'a>> {
-    let mut pager = Pager::default();
-    // The groups that hang from one group, in breadth-first order; families number themselves by their turn.
-    let mut families = VecDeque::from([(vec![ChildList::single(0)], 0)]);
-    let mut announced = 1;
-    while let Some((family, level)) = families.pop_front() {
-        pager.begin_family(family.iter().map(|group| group.as_slice().len()).sum());
-        for group in family {
-            let below: Vec<ChildList> = group
-                .as_slice()
-                .iter()
-                .map(|index| ChildList::of(nodes, *index as usize))
-                .filter(|children| !children.as_slice().is_empty())
-                .collect();
-            pager.push_group(nodes, group, level, has_colors, (!below.is_empty()).then_some(announced));
-            if !below.is_empty() {
-                families.push_back((below, level + 1));
-                announced += 1;
-            }
-        }
-        phases.at(pager.nodes);
-    }
-    let Pager { finished, mut records, mut levels, nodes, leaves, nodes_of_levels, .. } = pager.finish();
+    let tree = Tree::of(quantised, colors);
+    phases.begin("count", tree.node_count());
+    let mut statistics = Statistics::default();
+    let mut raw_bytes = 0;
+    let pager = tree.walk(phases, |pages| {
+        let counted = pages
+            .par_iter()
+            .fold(Statistics::default, |mut statistics, page| {
+                codec::count(page, &mut statistics);
+                statistics
+            })
+            .reduce(Statistics::default, |mut sum, statistics| {
+                sum.add(&statistics);
+                sum
+            });
+        statistics.add(&counted);
+        raw_bytes += pages.iter().map(|page| page.raw_bytes() as u64).sum::<u64>();
+        Ok(())
+    })?;
+    let model = Model::of(&statistics);
+    // A small file's model may cost more than it saves.
+    let model = (raw_bytes > 4 * model.to_bytes().len() as u64).then_some(model);
+    let (mut records, mut levels) = (pager.records(), pager.levels);
     let pointers: u64 = records.iter().map(|page| u64::from(page.words - page.nodes)).sum();
-    let raw_bytes: u64 = finished.iter().map(|page| page.raw_bytes() as u64).sum::<u64>() + pointers * 2;
 
-    let (model, coded) = code(&finished);
+    phases.begin("write", tree.node_count());
     let skeleton_bytes = Skeleton::encoded_bytes(records.len() as u64, model.as_ref());
     let mut writer = Writer::new(BufWriter::with_capacity(1 << 20, file), Kind::Splats, skeleton_bytes)?;
-    for ((record, (codec, bytes)), nodes_of_level) in records.iter_mut().zip(coded).zip(nodes_of_levels) {
-        record.bytes = bytes.len() as u32;
-        record.checksum = gigalod_format::checksum(&bytes);
-        record.codec = codec;
-        for (level, count) in nodes_of_level {
-            levels[level].bytes += bytes.len() as u64 * count / u64::from(record.nodes);
+    let mut number = 0;
+    tree.walk(phases, |pages| {
+        let coded: Vec<(u8, Vec<u8>)> = pages.par_iter().map(|page| code(page, model.as_ref())).collect();
+        for (codec, bytes) in coded {
+            let record: &mut PageRecord = &mut records[number];
+            record.bytes = bytes.len() as u32;
+            record.checksum = gigalod_format::checksum(&bytes);
+            record.codec = codec;
+            for (level, count) in &pager.nodes_of_levels[number] {
+                levels[*level].bytes += bytes.len() as u64 * count / u64::from(record.nodes);
+            }
+            writer.page(&bytes)?;
+            number += 1;
         }
-        writer.page(&bytes)?;
-    }
-    Ok(Written { writer, pages: records, model, nodes, leaves, levels, raw_bytes })
+        Ok(())
+    })?;
+    let (nodes, leaves) = (pager.nodes, pager.leaves);
+    Ok(Written { writer, pages: records, model, nodes, leaves, levels, raw_bytes: raw_bytes + pointers * 2 })
 }
 
-/// Bytes of all pages, each by the codec that makes it smaller, and the model; none where it would not pay for itself.
-fn code(pages: &[PageContents]) -> (Option<Model>, Vec<(u8, Vec<u8>)>) {
-    let statistics = pages
-        .par_iter()
-        .fold(Statistics::default, |mut statistics, page| {
-            codec::count(page, &mut statistics);
-            statistics
-        })
-        .reduce(Statistics::default, |mut sum, statistics| {
-            sum.add(&statistics);
-            sum
+/// A page by the codec that makes it smaller.
+fn code(page: &PageContents, model: Option<&Model>) -> (u8, Vec<u8>) {
+    let coded = model.map(|model| codec::encode(page, model)).filter(|bytes| bytes.len() < page.raw_bytes());
+    coded.map_or_else(|| (CODEC_RAW, page.encode()), |bytes| (CODEC_ENTROPY, bytes))
+}
+
+/// All nodes, to be walked level by level.
+struct Tree<'a> {
+    quantised: &'a Quantised,
+    colors: &'a Spool<u16>,
+    /// Where each chunk's nodes begin.
+    starts: Vec<u64>,
+    /// Which chunk a unit of the tree on top is.
+    chunk_of_unit: Vec<u32>,
+}
+
+/// Groups that stand next to each other on a level.
+#[derive(Clone, Copy)]
+enum Run {
+    /// One group of the tree on top.
+    Top(ChildList),
+    /// All groups of a level of a chunk, counted from its root: level 1 is the group of the root's children.
+    Chunk { chunk: usize, level: usize },
+}
+
+impl<'a> Tree<'a> {
+    fn of(quantised: &'a Quantised, colors: &'a Spool<u16>) -> Self {
+        let mut chunk_of_unit = vec![0; quantised.top.len()];
+        let units = quantised.top.iter().enumerate().filter(|(_, node)| node.units == 1);
+        for (chunk, (index, _)) in units.enumerate() {
+            chunk_of_unit[index] = chunk as u32;
+        }
+        let mut start = 0;
+        let starts = quantised.levels.iter().map(|levels| {
+            let here = start;
+            start += levels.iter().map(|(count, _)| u64::from(*count)).sum::<u64>();
+            here
         });
-    let model = Model::of(&statistics);
-    let coded: Vec<(u8, Vec<u8>)> = pages
-        .par_iter()
-        .map(|page| {
-            let bytes = codec::encode(page, &model);
-            if bytes.len() < page.raw_bytes() { (CODEC_ENTROPY, bytes) } else { (CODEC_RAW, page.encode()) }
-        })
-        .collect();
-    let saved: usize = pages.iter().zip(&coded).map(|(page, (_, bytes))| page.raw_bytes() - bytes.len()).sum();
-    if saved > model.to_bytes().len() {
-        (Some(model), coded)
-    } else {
-        (None, pages.iter().map(|page| (CODEC_RAW, page.encode())).collect())
+        Self { quantised, colors, starts: starts.collect(), chunk_of_unit }
     }
-}
 
-/// Packs families into pages.
-#[derive(Default)]
-struct Pager {
-    contents: PageContents,
-    /// Nodes and pointers in `contents`.
-    words: u16,
-    /// Number of the first family that hangs from `contents`.
-    first_family: Option<u64>,
-    /// Nodes of `contents` on each level.
-    nodes_of_level: Vec<(usize, u64)>,
+    fn node_count(&self) -> u64 {
+        self.quantised.nodes.len()
+    }
 
-    /// Pages that are full, with a record, a first family and nodes on each level.
-    finished: Vec<PageContents>,
-    records: Vec<PageRecord>,
-    first_families: Vec<Option<u64>>,
-    nodes_of_levels: Vec<Vec<(usize, u64)>>,
-    /// Where each family begins.
-    starts: Vec<(PageId, WordIndex)>,
-    levels: Vec<LevelSummary>,
-    nodes: u64,
-    leaves: u64,
-}
-
-impl Pager {
-    fn begin_family(&mut self, nodes: usize) {
-        if self.contents.nodes.len() + nodes > MAX_NODES {
-            self.end_page();
+    /// Packs all families into pages, in order; `visit` gets the pages as they are full.
+    fn walk(&self, phases: &Phases<'_>, mut visit: impl FnMut(&[PageContents]) -> io::Result<()>) -> io::Result<Pager> {
+        let mut pager = Pager::default();
+        let mut runs = vec![Run::Top(ChildList::single(0))];
+        pager.begin_family(1);
+        self.push_top(&ChildList::single(0), 0, &mut pager);
+        for level in 1.. {
+            let mut next = Vec::new();
+            for run in &runs {
+                match *run {
+                    Run::Top(group) => self.families_below_top(&group, level, &mut pager, &mut next)?,
+                    Run::Chunk { chunk, level: inside } => {
+                        self.families_below_chunk(chunk, inside, level, &mut pager, &mut next)?;
+                    }
+                }
+                if pager.full.len() >= PAGES_AT_ONCE {
+                    visit(&pager.full)?;
+                    pager.full.clear();
+                    phases.at(pager.nodes);
+                }
+            }
+            if next.is_empty() {
+                break;
+            }
+            runs = next;
         }
-        self.starts.push((PageId(self.finished.len() as u32), WordIndex(self.words)));
+        pager.end();
+        visit(&pager.full)?;
+        pager.full.clear();
+        Ok(pager)
     }
 
-    fn push_group(
-        &mut self,
-        nodes: &[Binary],
-        group: ChildList,
+    /// The family on `level` that hangs from a group of the tree on top.
+    fn families_below_top(
+        &self,
+        group: &ChildList,
         level: usize,
-        has_colors: bool,
-        family_below: Option<u64>,
-    ) {
-        let group = group.as_slice();
-        self.contents.group_sizes.push(group.len() as u8);
-        self.words += group.len() as u16 + u16::from(family_below.is_some());
-        self.first_family = self.first_family.or(family_below);
-        if self.levels.len() == level {
-            let level = level as u32;
-            self.levels.push(LevelSummary { level, nodes: 0, triangles: 0, points: 0, bytes: 0, max_error: 0.0 });
-        }
-        let summary = &mut self.levels[level];
-        for index in group {
-            let node = &nodes[*index as usize];
-            let packed = Node::pack(node.code, node.normal, node.cone, children(nodes, *index as usize));
-            self.contents.nodes.push(packed);
-            if has_colors {
-                self.contents.colors.push(rgb565_of_srgb8(node.mean_color.to_array().map(srgb8_of_linear)));
-            }
-            self.leaves += u64::from(packed.is_leaf());
-            // error_geo = (1 + k) times the radius; k = 1, round.
-            summary.max_error = summary.max_error.max(2.0 * f64::from(node.sphere.radius));
-        }
-        summary.nodes += group.len() as u64;
-        summary.points += group.len() as u64;
-        self.nodes += group.len() as u64;
-        match self.nodes_of_level.last_mut() {
-            Some((last, count)) if *last == level => *count += group.len() as u64,
-            _ => self.nodes_of_level.push((level, group.len() as u64)),
-        }
-    }
-
-    fn end_page(&mut self) {
-        self.records.push(PageRecord {
-            bytes: 0,
-            checksum: 0,
-            first_child_page: PageId(0),
-            first_child_word: WordIndex(0),
-            nodes: self.contents.nodes.len() as u16,
-            words: self.words,
-            codec: CODEC_RAW,
-        });
-        self.nodes_of_levels.push(std::mem::take(&mut self.nodes_of_level));
-        self.first_families.push(self.first_family.take());
-        self.finished.push(std::mem::take(&mut self.contents));
-        self.words = 0;
-    }
-
-    /// Ends the last page and fills in where each page's first family went.
-    fn finish(mut self) -> Self {
-        self.end_page();
-        for (record, family) in self.records.iter_mut().zip(&self.first_families) {
-            if let Some(family) = family {
-                (record.first_child_page, record.first_child_word) = self.starts[*family as usize];
+        pager: &mut Pager,
+        next: &mut Vec<Run>,
+    ) -> io::Result<()> {
+        let first_run = next.len();
+        let mut nodes_below = 0;
+        for index in group.as_slice() {
+            let index = *index as usize;
+            let (below, run) = if self.quantised.top[index].units == 1 {
+                let chunk = self.chunk_of_unit[index] as usize;
+                let below = self.quantised.levels[chunk].get(1).map_or(0, |(count, _)| *count as usize);
+                (below, Run::Chunk { chunk, level: 1 })
+            } else {
+                let below = ChildList::of(&self.quantised.top, index);
+                (below.as_slice().len(), Run::Top(below))
+            };
+            if below > 0 {
+                nodes_below += below;
+                next.push(run);
             }
         }
-        self
+        if nodes_below == 0 {
+            return Ok(());
+        }
+        pager.begin_family(nodes_below);
+        for run in &next[first_run..] {
+            match *run {
+                Run::Top(group) => self.push_top(&group, level, pager),
+                Run::Chunk { chunk, .. } => {
+                    let (nodes, colors) = self.level(chunk, 1)?;
+                    pager.push_group(&nodes, &colors, level, self.quantised.levels[chunk][1].1);
+                }
+            }
+        }
+        Ok(())
     }
-}
 
-fn children(nodes: &[Binary], index: usize) -> Children {
-    let list = ChildList::of(nodes, index);
-    let below = list.as_slice();
-    let all_leaves = !below.is_empty() && below.iter().all(|child| nodes[*child as usize].leaves == 1);
-    Children { count: below.len() as u8, all_leaves }
+    /// The families on `level` that hang from the groups of a chunk's level `inside`.
+    fn families_below_chunk(
+        &self,
+        chunk: usize,
+        inside: usize,
+        level: usize,
+        pager: &mut Pager,
+        next: &mut Vec<Run>,
+    ) -> io::Result<()> {
+        let Some((_, radius)) = self.quantised.levels[chunk].get(inside + 1) else { return Ok(()) };
+        let (above, _) = self.level(chunk, inside - 1)?;
+        let (groups, _) = self.level(chunk, inside)?;
+        let (below, colors) = self.level(chunk, inside + 1)?;
+        let count = |node: &Node| usize::from(node.children().count);
+        let (mut from_groups, mut from_below) = (0, 0);
+        for size in above.iter().map(count).filter(|size| *size > 0) {
+            let group = &groups[from_groups..from_groups + size];
+            from_groups += size;
+            let in_family = group.iter().map(count).sum();
+            if in_family == 0 {
+                continue;
+            }
+            pager.begin_family(in_family);
+            for size in group.iter().map(count).filter(|size| *size > 0) {
+                let range = from_below..from_below + size;
+                pager.push_group(&below[range.clone()], colors.get(range).unwrap_or_default(), level, *radius);
+                from_below += size;
+            }
+        }
+        next.push(Run::Chunk { chunk, level: inside + 1 });
+        Ok(())
+    }
+
+    fn push_top(&self, group: &ChildList, level: usize, pager: &mut Pager) {
+        let (mut nodes, mut colors, mut radius) = (Vec::new(), Vec::new(), 0.0_f32);
+        for index in group.as_slice() {
+            let index = *index as usize;
+            let node = &self.quantised.top[index];
+            nodes.push(self.quantised.top_nodes[index]);
+            if self.colors.len() > 0 {
+                colors.push(packed_color(node.mean_color));
+            }
+            radius = radius.max(node.sphere.radius);
+        }
+        pager.push_group(&nodes, &colors, level, radius);
+    }
+
+    /// Nodes of a level of a chunk, and their colours or none.
+    fn level(&self, chunk: usize, level: usize) -> io::Result<(Vec<Node>, Vec<u16>)> {
+        let levels = &self.quantised.levels[chunk];
+        let before: u64 = levels[..level].iter().map(|(count, _)| u64::from(*count)).sum();
+        let (start, count) = (self.starts[chunk] + before, levels[level].0 as usize);
+        let (mut words, mut colors) = (Vec::new(), Vec::new());
+        self.quantised.nodes.read_vec(start, count, &mut words)?;
+        if self.colors.len() > 0 {
+            self.colors.read_vec(start, count, &mut colors)?;
+        }
+        Ok((words.into_iter().map(Node).collect(), colors))
+    }
 }

@@ -1,46 +1,58 @@
-//! The whole mesh, read from a stream into memory, as long as the budget allows.
+//! The whole mesh, read from a stream once, in memory or spooled to disk.
 
+use super::plan::MemoryPlan;
 use crate::BuildError;
 use crate::progress::Phases;
+use crate::spool::Spool;
 use gigalod_import::{Batch, ModelStream};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 /// An indexed mesh as it was read.
 pub(super) struct Mesh {
-    pub(super) positions: Vec<DVec3>,
+    pub(super) positions: Spool<[f64; 3]>,
     /// One for each vertex, or empty.
-    pub(super) normals: Vec<Vec3>,
+    pub(super) normals: Spool<[f32; 3]>,
     /// 8-bit sRGB, one for each vertex, or empty.
-    pub(super) colors: Vec<[u8; 3]>,
-    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) colors: Spool<[u8; 3]>,
+    pub(super) triangles: Spool<[u32; 3]>,
 }
 
-/// Bytes that building takes for each vertex and triangle, all phases considered: the mesh itself (24 + 12 + 3 and 12), then
-/// leaves and two binary nodes a vertex beside it.
-const BYTES_PER_VERTEX: u64 = 240;
-const BYTES_PER_TRIANGLE: u64 = 12;
-
-pub(super) fn read(input: &mut dyn ModelStream, memory_bytes: u64, phases: &Phases<'_>) -> Result<Mesh, BuildError> {
+pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phases<'_>) -> Result<Mesh, BuildError> {
     phases.begin("read", input.bytes_consumed().1);
-    let mut mesh = Mesh { positions: Vec::new(), normals: Vec::new(), colors: Vec::new(), triangles: Vec::new() };
+    let place = plan.place();
+    let mut mesh = Mesh {
+        positions: Spool::new(&place).map_err(BuildError::Scratch)?,
+        normals: Spool::new(&place).map_err(BuildError::Scratch)?,
+        colors: Spool::new(&place).map_err(BuildError::Scratch)?,
+        triangles: Spool::new(&place).map_err(BuildError::Scratch)?,
+    };
+    if let (Some(vertices), Some(faces)) = (input.declared_vertices(), input.declared_faces()) {
+        // A header's word, believed only as far as the plan found room for it.
+        mesh.positions.expect(vertices.min(plan.most_vertices()));
+        mesh.triangles.expect(faces.min(plan.most_triangles()));
+    }
     let mut batch = Batch::default();
+    let mut normals: Vec<[f32; 3]> = Vec::new();
+    let mut positions: Vec<[f64; 3]> = Vec::new();
     while input.next(&mut batch)? {
-        mesh.positions.extend_from_slice(&batch.vertices.positions);
-        mesh.normals.extend_from_slice(&batch.vertices.normals);
-        mesh.colors.extend_from_slice(&batch.vertices.colors);
-        mesh.triangles.extend_from_slice(&batch.triangles);
-        let needed = mesh.positions.len() as u64 * BYTES_PER_VERTEX + mesh.triangles.len() as u64 * BYTES_PER_TRIANGLE;
-        if needed > memory_bytes {
-            return Err(BuildError::OverBudget {
-                elements: format!("{} vertices and {} triangles", mesh.positions.len(), mesh.triangles.len()),
-                needed: format!("{} MiB", needed >> 20),
-                budget: format!("{} MiB", memory_bytes >> 20),
-            });
-        }
+        positions.clear();
+        positions.extend(batch.vertices.positions.iter().map(|position| position.to_array()));
+        normals.clear();
+        normals.extend(batch.vertices.normals.iter().map(Vec3::to_array));
+        let mut push = || {
+            mesh.positions.push(&positions)?;
+            mesh.normals.push(&normals)?;
+            mesh.colors.push(&batch.vertices.colors)?;
+            mesh.triangles.push(&batch.triangles)
+        };
+        push().map_err(BuildError::Scratch)?;
         phases.at(input.bytes_consumed().0);
     }
-    if mesh.triangles.is_empty() {
-        return Err(BuildError::NoTriangles { vertices: mesh.positions.len() as u64 });
+    if mesh.triangles.len() == 0 {
+        return Err(BuildError::NoTriangles { vertices: mesh.positions.len() });
+    }
+    if mesh.positions.len() >= 1 << 31 {
+        return Err(BuildError::TooManyVertices { found: mesh.positions.len() });
     }
     Ok(mesh)
 }

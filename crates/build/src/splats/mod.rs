@@ -3,20 +3,28 @@
 //! The way of the data, a file for each step:
 //!
 //! ```text
-//! mesh ──▶ leaves ──▶ tree ──▶ contract ──▶ quantise ──▶ layout ──▶ pages
-//! stream   a sphere   binary,  2–4 children  codes,       breadth-first
-//!          a vertex   midpoint  a node       top-down     families
+//! mesh ──▶ leaves ──▶ divide ──▶ chunk: tree, contract ──▶ quantise ──▶ layout, pager ──▶ pages
+//! stream   a sphere   chunks of  binary,   2–4 children    codes,       breadth-first
+//!          a vertex   65,536     midpoint  a node          top-down     families
 //! ```
+//!
+//! What grows with the model lies in spools, in memory or on disk as the [`plan`] has it; the rest is the size of a chunk.
 //!
 //! What always holds: each decoded sphere encloses the true sphere of its node, and with it all true leaves below; each
 //! node's cone holds the cones of its children as decoded, and a leaf's cone the normals of all triangles at its vertex.
-//! The tree depends on the set of vertices alone, not on their order.
+//! The tree depends on the set of vertices alone, not on their order, and
+//! the bytes of the file on nothing else but the sums of normals, which are taken in the order of the triangles.
 
+mod chunk;
 mod contract;
+mod divide;
+mod join;
 mod layout;
 mod leaves;
 mod mesh;
 mod orientation;
+mod pager;
+mod plan;
 mod quantise;
 mod tree;
 
@@ -46,31 +54,27 @@ pub fn build(
         .build()
         .map_err(|error| BuildError::Threads(error.to_string()))?;
 
-    let mesh = mesh::read(&mut *input, options.memory_bytes, &phases)?;
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let plan = plan::MemoryPlan::new(options, &*input, folder);
+
+    let mesh = mesh::read(&mut *input, &plan, &phases)?;
     let up = options.up.unwrap_or(input.up_axis());
-    let counts =
-        InputCounts { triangles: mesh.triangles.len() as u64, vertices: mesh.positions.len() as u64, points: 0 };
+    let counts = InputCounts { triangles: mesh.triangles.len(), vertices: mesh.positions.len(), points: 0 };
     drop(input);
 
-    phases.begin("leaves", 0);
-    let leaves::Leaves { mut leaves, origin, bounds, closed, has_colors } = leaves::from_mesh(mesh)?;
-
-    let (tree, quantised) = workers.install(|| {
-        phases.begin("tree", 0);
-        let mut tree = tree::build(&mut leaves);
-        contract::set_cones(&mut tree);
-        phases.begin("quantise", 0);
-        let quantised = quantise::top_down(&mut tree);
-        (tree, quantised)
-    });
-    drop(leaves);
-
-    phases.begin("write", tree.len() as u64);
+    let leaves = workers.install(|| leaves::from_mesh(mesh, &plan, &phases))?;
+    let leaves::Leaves { leaves, origin, bounds, closed, has_colors } = leaves;
+    let (quantised, colors) = workers.install(|| {
+        let mut chunks = divide::divide(leaves, has_colors, &plan, &phases)?;
+        let top = std::mem::take(&mut chunks.top);
+        let quantised = quantise::top_down(&chunks, top, &plan, &phases).map_err(BuildError::Scratch)?;
+        Ok::<_, BuildError>((quantised, chunks.colors))
+    })?;
     let layout::Written { writer, pages, model, nodes, leaves, levels, raw_bytes } =
-        workers.install(|| layout::write(&tree, has_colors, output.file(), &phases)).map_err(BuildError::Output)?;
+        workers.install(|| layout::write(&quantised, &colors, output.file(), &phases)).map_err(BuildError::Output)?;
     let root = Root {
         origin,
-        sphere: tree[0].sphere,
+        sphere: quantised.top[0].sphere,
         overhang: quantised.overhang,
         bounds,
         nodes,

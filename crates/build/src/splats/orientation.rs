@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-/// Collects triangles; ask [`Orientation::is_closed`] at the end.
+/// Collects triangles, anywhere in any order; ask [`Orientation::is_closed`] at the end.
 #[derive(Default)]
 pub(super) struct Orientation {
     balance: u128,
@@ -27,6 +27,12 @@ impl Orientation {
             }
         }
         self.six_volumes += a.dot(b.cross(c));
+    }
+
+    /// Adds what another has collected.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.balance = self.balance.wrapping_add(other.balance);
+        self.six_volumes += other.six_volumes;
     }
 
     pub(super) fn is_closed(&self) -> bool {

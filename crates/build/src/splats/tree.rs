@@ -3,7 +3,7 @@
 //! `BuildTree`).
 //!
 //! Nodes lie in preorder: the left child of node i is i + 1, the right one follows the left subtree, and a subtree of k
-//! leaves takes 2k − 1 nodes. Subtrees are disjoint slices, so they build in parallel without locks.
+//! units takes 2k − 1 nodes. A unit is a leaf; in the tree on top of all chunks it is a chunk.
 //!
 //! Better than the paper: means are weighted by the number of leaves, so a lone vertex does not outweigh a hundred others;
 //! colours are averaged in linear light; vertices in the same place, which no plane separates, are halved by number.
@@ -24,8 +24,10 @@ pub(super) struct Binary {
     pub(super) mean_normal: Vec3,
     /// Mean of the leaves' colours, in linear light.
     pub(super) mean_color: Vec3,
-    /// Leaves below; 1 for a leaf.
-    pub(super) leaves: u32,
+    /// Units below, leaves or whole chunks; 1 for a unit. Preorder is counted in these.
+    pub(super) units: u32,
+    /// Leaves of the hierarchy below.
+    pub(super) weight: u32,
     /// Code of the normal as stored.
     pub(super) normal: u16,
     /// Code of the sphere relative to the decoded parent.
@@ -36,22 +38,53 @@ pub(super) struct Binary {
     pub(super) plan: Plan,
 }
 
-/// Below this many leaves a subtree is not worth a task of its own.
-const TASK_LEAVES: usize = 4096;
-
-/// Builds the tree; `leaves` are reordered.
-pub(super) fn build(leaves: &mut [Leaf]) -> Vec<Binary> {
-    let blank = Binary {
+impl Binary {
+    const BLANK: Self = Self {
         sphere: Sphere { center: Vec3::ZERO, radius: 0.0 },
         mean_normal: Vec3::ZERO,
         mean_color: Vec3::ZERO,
-        leaves: 0,
+        units: 0,
+        weight: 0,
         normal: 0,
         code: 0,
         cone: 0,
-        plan: Plan::default(),
+        plan: Plan::NONE,
     };
-    let mut nodes = vec![blank; leaves.len() * 2 - 1];
+
+    fn of_leaf(leaf: &Leaf) -> Self {
+        Self {
+            sphere: leaf.sphere(),
+            mean_normal: normal::decode(leaf.normal),
+            mean_color: Vec3::from_array(leaf.color.map(|value| LINEAR_OF_SRGB8[usize::from(value)])),
+            units: 1,
+            weight: 1,
+            normal: leaf.normal,
+            cone: leaf.cone,
+            ..Self::BLANK
+        }
+    }
+
+    /// The parent of two nodes; its cone is still to come.
+    pub(super) fn around(left: &Self, right: &Self, plan: Plan) -> Self {
+        let share = right.weight as f32 / (left.weight + right.weight) as f32;
+        let mean_normal = left.mean_normal.lerp(right.mean_normal, share);
+        let direction = [mean_normal, left.mean_normal, Vec3::Y].into_iter().find(|n| *n != Vec3::ZERO);
+        Self {
+            sphere: Sphere::around(&left.sphere, &right.sphere),
+            mean_normal,
+            mean_color: left.mean_color.lerp(right.mean_color, share),
+            units: left.units + right.units,
+            weight: left.weight + right.weight,
+            normal: normal::encode(direction.unwrap_or(Vec3::Y)),
+            plan,
+            ..Self::BLANK
+        }
+    }
+}
+
+/// Builds the tree of at least one leaf; `leaves` are reordered.
+pub(super) fn build(leaves: &mut [Leaf]) -> Vec<Binary> {
+    let mut nodes = vec![Binary::BLANK; leaves.len() * 2 - 1];
     subtree(leaves, &mut nodes);
     nodes
 }
@@ -59,58 +92,71 @@ pub(super) fn build(leaves: &mut [Leaf]) -> Vec<Binary> {
 fn subtree(leaves: &mut [Leaf], nodes: &mut [Binary]) -> Costs {
     let (node, below) = nodes.split_first_mut().expect("a subtree has at least one node");
     if let [leaf] = leaves {
-        node.sphere = leaf.sphere;
-        node.mean_normal = normal::decode(leaf.normal);
-        node.mean_color = Vec3::from_array(leaf.color.map(|value| LINEAR_OF_SRGB8[usize::from(value)]));
-        node.leaves = 1;
-        node.normal = leaf.normal;
-        node.cone = leaf.cone;
+        *node = Binary::of_leaf(leaf);
         return Costs::LEAF;
     }
     let middle = split(leaves);
-    let parallel = leaves.len() > TASK_LEAVES;
     let (left_leaves, right_leaves) = leaves.split_at_mut(middle);
     let (left, right) = below.split_at_mut(2 * middle - 1);
-    let (left_costs, right_costs) = if parallel {
-        rayon::join(|| subtree(left_leaves, left), || subtree(right_leaves, right))
-    } else {
-        (subtree(left_leaves, left), subtree(right_leaves, right))
-    };
-    let (left, right) = (&left[0], &right[0]);
-    let share = right.leaves as f32 / (left.leaves + right.leaves) as f32;
-    node.sphere = Sphere::around(&left.sphere, &right.sphere);
-    node.mean_normal = left.mean_normal.lerp(right.mean_normal, share);
-    node.mean_color = left.mean_color.lerp(right.mean_color, share);
-    node.leaves = left.leaves + right.leaves;
-    let direction = [node.mean_normal, left.mean_normal, Vec3::Y].into_iter().find(|n| *n != Vec3::ZERO);
-    node.normal = normal::encode(direction.unwrap_or(Vec3::Y));
-    let (costs, plan) = Costs::merge(left_costs, right_costs);
-    node.plan = plan;
+    let (costs, plan) = Costs::merge(subtree(left_leaves, left), subtree(right_leaves, right));
+    *node = Binary::around(&left[0], &right[0], plan);
     costs
 }
 
-/// Reorders the leaves into two halves, neither empty; returns where the second begins.
-fn split(leaves: &mut [Leaf]) -> usize {
-    let (min, max) = leaves.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), leaf| {
-        (min.min(leaf.sphere.center), max.max(leaf.sphere.center))
-    });
-    let extent = max - min;
-    let axis = if extent.x >= extent.y && extent.x >= extent.z {
-        0
-    } else if extent.y >= extent.z {
-        1
-    } else {
-        2
-    };
-    if extent[axis] <= 0.0 {
-        // All in one place: any order will do that does not depend on the one they came in.
-        leaves.sort_unstable_by_key(|leaf| (leaf.sphere.radius.to_bits(), leaf.normal, leaf.cone, leaf.color));
-        return leaves.len() / 2;
+/// The box around centres of leaves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    min: Vec3,
+    max: Vec3,
+}
+
+impl Extent {
+    pub(super) const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    pub(super) fn including(self, leaf: &Leaf) -> Self {
+        let center = Vec3::from_array(leaf.center);
+        Self { min: self.min.min(center), max: self.max.max(center) }
     }
-    // Rounding may put the midpoint of two neighbouring numbers on the upper one: then that one alone goes right.
-    let middle = min[axis] + extent[axis] * 0.5;
-    let last_left = middle.min(max[axis].next_down());
-    partition(leaves, |leaf| leaf.sphere.center[axis] <= last_left)
+
+    /// The plane at the midpoint of the longest axis; none where all is in one place. Neither side of it is empty.
+    pub(super) fn plane(&self) -> Option<Plane> {
+        let extent = self.max - self.min;
+        let axis = if extent.x >= extent.y && extent.x >= extent.z {
+            0
+        } else if extent.y >= extent.z {
+            1
+        } else {
+            2
+        };
+        // Rounding may put the midpoint of two neighbouring numbers on the upper one: then that one alone goes right.
+        let middle = self.min[axis] + extent[axis] * 0.5;
+        (extent[axis] > 0.0).then_some(Plane { axis, last_left: middle.min(self.max[axis].next_down()) })
+    }
+}
+
+/// Separates leaves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    axis: usize,
+    last_left: f32,
+}
+
+impl Plane {
+    pub(super) fn is_left(&self, leaf: &Leaf) -> bool {
+        leaf.center[self.axis] <= self.last_left
+    }
+}
+
+/// Reorders the leaves into two halves, neither empty; returns where the second begins.
+pub(super) fn split(leaves: &mut [Leaf]) -> usize {
+    match leaves.iter().fold(Extent::EMPTY, Extent::including).plane() {
+        Some(plane) => partition(leaves, |leaf| plane.is_left(leaf)),
+        None => {
+            // All in one place: any order will do that does not depend on the one they came in.
+            leaves.sort_unstable_by_key(|leaf| (leaf.radius.to_bits(), leaf.normal, leaf.cone, leaf.color));
+            leaves.len() / 2
+        }
+    }
 }
 
 /// Moves the elements that `belongs_left` in front of the others; returns their number.

@@ -76,9 +76,9 @@ impl CliError {
         match error {
             BuildError::Import(error) => Self::import(input, error),
             BuildError::Output(error) => Self::write(output, error),
-            BuildError::OverBudget { .. } => {
-                Self::in_file(input, error).hint("give a larger --memory, as --memory 8GiB")
-            }
+            BuildError::Crowd { .. } => Self::in_file(input, error).hint("give a larger --memory, as --memory 8GiB"),
+            BuildError::Scratch(_) => Self::in_file(output, error)
+                .hint("temporary files lie in the folder of the output, and take up to three times the input"),
             BuildError::NoTriangles { .. } => {
                 Self::in_file(input, error).hint("point clouds without faces cannot be built yet")
             }

@@ -1,0 +1,74 @@
+//! How the builder keeps within its memory.
+//!
+//! Everything that grows with the model is a [`Spool`](crate::spool::Spool): in memory if all of it fits into half the budget, else
+//! in files. The other half is for the pieces that are worked on. Which it is changes the time a build takes, never its bytes.
+
+use super::chunk::MAX_LEAVES;
+use crate::Options;
+use crate::spool::Place;
+use gigalod_import::ModelStream;
+use std::path::Path;
+
+/// What the spools take for each vertex and triangle, at the stage where they take most: position, normal, colour and gathered
+/// attributes; then leaf, kept nodes and packed nodes.
+const SPOOLED_PER_VERTEX: u64 = 24 + 12 + 3 + 16;
+const SPOOLED_PER_TRIANGLE: u64 = 12;
+
+/// Bytes of work for each triangle that is joined with its vertices at a time: its corners, their places and order, positions
+/// and contributions.
+const WORK_PER_TRIANGLE: u64 = 12 + 3 * (8 + 24 + 16 + 16);
+
+/// Bytes of work for each leaf of a block: the leaf, its kept nodes, and a share of the trees in work.
+const WORK_PER_LEAF: u64 = 160;
+
+#[derive(Debug)]
+pub(super) struct MemoryPlan<'a> {
+    budget: u64,
+    in_memory: bool,
+    folder: &'a Path,
+}
+
+impl<'a> MemoryPlan<'a> {
+    /// Decides by what the stream declares; a stream that declares nothing is spooled to files in `folder`.
+    pub(super) fn new(options: &Options, input: &dyn ModelStream, folder: &'a Path) -> Self {
+        let spooled = match (input.declared_vertices(), input.declared_faces()) {
+            (Some(vertices), Some(faces)) => {
+                vertices.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE))
+            }
+            _ => u64::MAX,
+        };
+        Self { budget: options.memory_bytes, in_memory: spooled <= options.memory_bytes / 2, folder }
+    }
+
+    pub(super) fn place(&self) -> Place<'a> {
+        if self.in_memory { Place::Memory } else { Place::Folder(self.folder) }
+    }
+
+    /// True where all spools are in memory.
+    pub(super) fn is_in_memory(&self) -> bool {
+        self.in_memory
+    }
+
+    /// Vertices that memory has room for.
+    pub(super) fn most_vertices(&self) -> u64 {
+        self.budget / 2 / SPOOLED_PER_VERTEX
+    }
+
+    /// Triangles that memory has room for.
+    pub(super) fn most_triangles(&self) -> u64 {
+        self.budget / 2 / SPOOLED_PER_TRIANGLE
+    }
+
+    /// Triangles to be joined with their vertices at a time.
+    pub(super) fn triangles_at_once(&self) -> usize {
+        (self.budget / 2 / WORK_PER_TRIANGLE) as usize
+    }
+
+    /// Leaves to be made into trees at a time; never less than a chunk, which the smallest budget has room for.
+    pub(super) fn leaves_at_once(&self) -> usize {
+        ((self.budget / 2 / WORK_PER_LEAF) as usize).max(MAX_LEAVES)
+    }
+
+    /// Records of a piece that is read from a spool.
+    pub(super) const PIECE: usize = 1 << 16;
+}
