@@ -3,7 +3,15 @@
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
+
+/// Files that have no final name yet; a program that is interrupted can remove them.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A file beside its final place; gone when dropped before [`Output::publish`].
 #[derive(Debug)]
@@ -12,7 +20,22 @@ pub struct Output {
     path: PathBuf,
 }
 
+impl Drop for Output {
+    fn drop(&mut self) {
+        unfinished().retain(|path| path != self.temporary.path());
+    }
+}
+
 impl Output {
+    /// Removes all files of this process that have no final name yet: for a program that is about to end in the middle of
+    /// its work. What is being written to them is lost.
+    pub fn remove_unfinished() {
+        for path in unfinished().drain(..) {
+            // It may have got its name, or have been removed, a moment ago.
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
     /// Creates the file under a name of its own in the folder of `path`.
     ///
     /// # Errors
@@ -31,7 +54,9 @@ impl Output {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
-        Ok(Self { temporary: builder.tempfile_in(folder)?, path: path.to_owned() })
+        let temporary = builder.tempfile_in(folder)?;
+        unfinished().push(temporary.path().to_owned());
+        Ok(Self { temporary, path: path.to_owned() })
     }
 
     /// To write to.
@@ -45,7 +70,6 @@ impl Output {
     /// What the system says.
     pub fn publish(self) -> io::Result<()> {
         self.temporary.as_file().sync_all()?;
-        self.temporary.persist(&self.path).map_err(|error| error.error)?;
-        Ok(())
+        std::fs::rename(self.temporary.path(), &self.path)
     }
 }

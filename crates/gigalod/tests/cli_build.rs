@@ -250,3 +250,26 @@ fn paths_that_make_no_sense_are_refused() {
         assert!(!picture.exists());
     }
 }
+
+/// What Ctrl-C does, and `kill`.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_nothing_behind_and_ends_with_status_130() {
+    let folder = tempfile::tempdir().unwrap();
+    for signal in ["-INT", "-TERM"] {
+        let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_gigalod"))
+            .args(["synth", "statue", "--triangles", "400M", "-o"])
+            .arg(folder.path().join("huge.ply"))
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        // As soon as the unfinished file is there, the handler has long been set.
+        while std::fs::read_dir(folder.path()).unwrap().next().is_none() {
+            std::thread::yield_now();
+        }
+        let killed = std::process::Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
+        assert!(killed.success());
+        assert_eq!(run.wait().unwrap().code(), Some(130), "{signal}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{signal}");
+    }
+}

@@ -89,7 +89,7 @@ pub(crate) enum UpAxisArg {
 pub(crate) struct RenderArgs {
     /// Model: .glod, or a raw one
     pub(crate) file: PathBuf,
-    /// Picture to write; replaced if it exists
+    /// Picture to write, a PNG; replaced if it exists
     #[arg(short, long, value_name = "OUT.png")]
     pub(crate) output: PathBuf,
     /// Width and height in pixels
@@ -98,7 +98,7 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) camera: CameraArgs,
     /// Largest error on screen, in pixels [default: 1]
-    #[arg(long, value_parser = parse::positive, value_name = "PX")]
+    #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "PX")]
     pub(crate) error: Option<f64>,
     /// Draw all leaves, whatever their size on screen
     #[arg(long, conflicts_with = "error")]
@@ -138,9 +138,10 @@ pub(crate) struct CameraArgs {
     #[arg(long, value_parser = parse::direction, allow_hyphen_values = true, value_name = "X,Y,Z", requires = "eye")]
     pub(crate) up: Option<DVec3>,
     /// Vertical field of view, in degrees [default: 40]
-    #[arg(long, value_parser = parse::fov, value_name = "DEG")]
+    #[arg(long, value_parser = parse::fov, allow_hyphen_values = true, value_name = "DEG")]
     pub(crate) fov: Option<f64>,
-    /// Around the model: azimuth and elevation in degrees, and how many times nearer [default: 0,0,1]
+    /// Around the model's middle: azimuth (0 is the front, growing to the right), elevation (growing upwards), both in degrees,
+    /// and how many times nearer than a view of the whole [default: 0,0,1]
     #[arg(long, value_parser = parse::orbit, allow_hyphen_values = true, value_name = "AZ,EL[,ZOOM]",
         conflicts_with_all = ["eye", "path"])]
     pub(crate) orbit: Option<[f64; 3]>,

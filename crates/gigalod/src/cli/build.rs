@@ -13,6 +13,9 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// A model of fewer vertices is hardly a scan.
+const FEW_VERTICES: u64 = 5_000;
+
 /// The JSON object of `build`.
 #[derive(Serialize)]
 struct BuildReport<'a> {
@@ -45,6 +48,13 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
     let report = build(input, &args.output, &args.options, args.up.map(UpAxis::from), console)?;
     let (seconds, cpu_seconds) = usage.seconds();
     let metadata = &report.metadata;
+    if metadata.leaves < FEW_VERTICES {
+        let what = format!(
+            "only {} vertices; splats are made for dense scans, large triangles become large discs",
+            metadata.leaves
+        );
+        console.warn(&CliError::in_file(input, what));
+    }
     let json = BuildReport {
         kind: "splats",
         input: metadata.input,

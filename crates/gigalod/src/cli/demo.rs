@@ -31,23 +31,23 @@ struct Shot {
 const SHOTS: [Shot; 4] = [
     Shot {
         file: "1-whole.png",
-        shows: "the whole statue, error 1 px",
+        shows: "the whole statue, --error 1",
         at: DVec3::ZERO,
-        orbit: [25.0, 6.0, 1.15],
+        orbit: [25.0, 6.0, 1.0],
         threshold_px: 1.0,
         tint: Tint::Model,
     },
     Shot {
         file: "2-face.png",
-        shows: "the face, error 1 px",
+        shows: "the face, --error 1",
         at: DVec3::new(0.0, 0.5, 0.3),
         orbit: [32.0, 4.0, 2.6],
         threshold_px: 1.0,
         tint: Tint::Model,
     },
     Shot {
-        file: "3-eye.png",
-        shows: "an eye, as fine as the data",
+        file: "3-eyes.png",
+        shows: "the eyes, as close as the data go",
         at: DVec3::new(0.14, 0.53, 0.55),
         orbit: [20.0, 8.0, 8.0],
         threshold_px: 1.0,
@@ -55,7 +55,7 @@ const SHOTS: [Shot; 4] = [
     },
     Shot {
         file: "4-levels.png",
-        shows: "levels of detail by colour, error 6 px",
+        shows: "levels of detail, a colour each, --error 6",
         at: DVec3::new(0.0, 0.25, 0.2),
         orbit: [25.0, 20.0, 1.6],
         threshold_px: 6.0,

@@ -77,6 +77,16 @@ pub(crate) fn write_atomically(
     output.publish().map_err(wrong)
 }
 
+/// Refuses names that promise another format than PNG.
+pub(crate) fn check_png_name(path: &Path) -> Result<(), CliError> {
+    match path.extension() {
+        Some(extension) if !extension.eq_ignore_ascii_case("png") => {
+            Err(CliError::in_file(path, "pictures are written as PNG, expected a name that ends in .png"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes an 8-bit sRGB picture with alpha.
 pub(crate) fn write_png(path: &Path, size: gigalod_geom::ImageSize, rgba: &[u8]) -> Result<(), CliError> {
     write_atomically(path, |out| {

@@ -41,6 +41,12 @@ pub(crate) fn run() -> ExitCode {
             return ExitCode::from(if failed { 2 } else { 0 });
         }
     };
+    // Where there are no signals to handle, files of an interrupted run stay behind; that is no reason not to run.
+    let _ = ctrlc::set_handler(|| {
+        gigalod_build::Output::remove_unfinished();
+        eprintln!("interrupted");
+        std::process::exit(130);
+    });
     let console = progress::Console::new(cli.json, cli.verbose);
     let outcome = match &cli.command {
         Command::Build(args) => build::run(args, &console),

@@ -113,8 +113,9 @@ pub(crate) fn threads(text: &str) -> Result<usize, String> {
 
 pub(crate) fn fov(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(degrees) if degrees > 0.0 && degrees < 180.0 => Ok(degrees),
-        _ => Err(format!("'{text}', expected degrees between 0 and 180")),
+        // Narrower than this single precision cannot tell pixels apart; wider, a picture is all smear.
+        Ok(degrees) if (0.01..=170.0).contains(&degrees) => Ok(degrees),
+        _ => Err(format!("'{text}', expected degrees from 0.01 to 170")),
     }
 }
 
@@ -160,6 +161,6 @@ mod tests {
         assert!(image_size("640").is_err() && image_size("0x4").is_err());
         assert_eq!(color("#ff8000"), Ok([255, 128, 0]));
         assert!(color("#ff80").is_err() && color("#+f8000").is_err());
-        assert!(fov("0").is_err() && fov("180").is_err() && fov("40") == Ok(40.0));
+        assert!(fov("0.001").is_err() && fov("180").is_err() && fov("40") == Ok(40.0));
     }
 }

@@ -35,10 +35,10 @@ pub(crate) fn read(path: &Path) -> Result<CameraPath, CliError> {
     if file.frames.is_empty() {
         return Err(CliError::in_file(path, "no frames, expected at least one"));
     }
-    if !(file.fov > 0.0 && file.fov < 180.0) {
+    if !(0.01..=170.0).contains(&file.fov) {
         return Err(CliError::in_file(
             path,
-            format!("a field of view of {}, expected degrees between 0 and 180", file.fov),
+            format!("a field of view of {}, expected degrees from 0.01 to 170", file.fov),
         ));
     }
     if !finite(&file.up) || file.up == [0.0; 3] {

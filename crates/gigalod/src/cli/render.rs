@@ -12,7 +12,7 @@ use gigalod_geom::{Aabb, Camera, ImageSize};
 use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{CutReport, Instance, Limit, Residency, Scene, Similarity, ViewId};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -79,6 +79,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
     for output in [Some(&args.output), args.depth.as_ref()].into_iter().flatten() {
         files::check_output(output, &inputs)?;
     }
+    files::check_png_name(&args.output)?;
     let file = cache::container_of(&args.file, &args.build, console)?;
     let mut stage = Stage::open(&file, args.cpu_budget)?;
     let camera = camera(&args.camera, args.size, &stage.bounds(), stage.up)?;
@@ -157,12 +158,11 @@ impl Stage {
             console.warn(&CliError::new(problem));
         }
         let json = self.report(job, &report, select_ms, frame_ms, problems);
-        let limit = report.limited_by.map_or(String::new(), |limit| format!(", limited by {}", limit.name()));
         let text = format!(
-            "{}: {} splats, largest error {:.2} px{limit}, in {frame_ms:.0} ms on {}\n",
+            "{}: {} splats, {}, in {frame_ms:.0} ms on {}\n",
             job.output.display(),
             report.drawn,
-            report.max_error_px,
+            finish(&report),
             self.renderer.gpu().adapter(),
         );
         Ok(Outcome::new(&json, text))
@@ -195,6 +195,20 @@ impl Stage {
             frame_ms,
             problems,
         }
+    }
+}
+
+/// How fine a picture became, in words.
+fn finish(report: &CutReport) -> String {
+    let coarsest = if report.max_error_px.is_finite() {
+        format!("{:.2} px across", report.max_error_px)
+    } else {
+        "around the eye itself".into()
+    };
+    match report.limited_by {
+        None => format!("none more than {coarsest}"),
+        Some(Limit::Data) => format!("as fine as the data: the coarsest is {coarsest}"),
+        Some(limit) => format!("coarser than asked for ({}): the coarsest is {coarsest}", limit.name()),
     }
 }
 
