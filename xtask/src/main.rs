@@ -3,6 +3,7 @@
 //! Needs the Rust toolchain and nothing else: what is missing is installed where that is possible, and named where it is not.
 #![forbid(unsafe_code)]
 
+mod bench;
 mod setup;
 mod steps;
 
@@ -13,9 +14,10 @@ cargo xtask COMMAND
 
   demo [ARGS]   make a statue of 2 million triangles, build it, draw four pictures into ./demo
   test          everything CI runs: format, lints, documentation, tests, shaders, web build
+  bench [--large]  measure against the targets, write docs/benchmarks.md (about 5 minutes; with 100 M triangles 10)
   setup         install what demo and test need (they do it by themselves)
 
-Environment of `test`:
+Environment of `test` and `bench`:
   GIGALOD_DATA  folder of real models; tests that want them are skipped without it
   REQUIRE_GPU   set: a test that finds no graphics adapter fails instead of being skipped
 ";
@@ -27,6 +29,7 @@ fn main() -> Result<()> {
     match command.as_str() {
         "setup" => setup::everything(),
         "demo" => steps::demo(&rest),
+        "bench" => bench::bench(&rest),
         "test" if rest.is_empty() => steps::test(),
         "" | "help" | "-h" | "--help" => {
             print!("{HELP}");

@@ -48,11 +48,15 @@ pub(crate) fn test() -> Result<()> {
 }
 
 /// Cargo, in the project's folder.
-fn cargo(arguments: &[&str]) -> Command {
+pub(crate) fn cargo(arguments: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask is a folder of the project");
-    command.current_dir(folder).args(arguments);
+    command.current_dir(project()).args(arguments);
     command
+}
+
+/// The project's folder.
+pub(crate) fn project() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask is a folder of the project")
 }
 
 /// Runs a command to its end.

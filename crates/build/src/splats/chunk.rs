@@ -16,6 +16,7 @@ use gigalod_geom::Sphere;
 use gigalod_geom::color::{rgb565_of_srgb8, srgb8_of_linear};
 use gigalod_geom::quantise::sphere;
 use glam::Vec3;
+use std::cell::RefCell;
 use std::collections::VecDeque;
 
 /// Leaves of a chunk at most: 15 MB of binary tree while it is built, and pages of its lower levels are well filled.
@@ -90,19 +91,31 @@ pub(super) fn packed_color(linear: Vec3) -> u16 {
     rgb565_of_srgb8(linear.to_array().map(srgb8_of_linear))
 }
 
+thread_local! {
+    /// The binary tree of the chunk in work: 7 MB that the system would clear for each chunk anew.
+    static TREE: RefCell<Vec<Binary>> = const { RefCell::new(Vec::new()) };
+}
+
 /// Builds the tree of a chunk's leaves, and merges its nodes.
 pub(super) fn raise(leaves: &mut [Leaf], has_colors: bool) -> Raised {
-    let mut nodes = tree::build(leaves);
-    contract::set_cones(&mut nodes);
-    let mut kept = Vec::with_capacity(leaves.len() * 3 / 2);
-    let mut colors = Vec::with_capacity(if has_colors { leaves.len() * 3 / 2 } else { 0 });
+    TREE.with_borrow_mut(|nodes| {
+        tree::build(leaves, nodes);
+        contract::set_cones(nodes);
+        keep(nodes, leaves.len(), has_colors)
+    })
+}
+
+/// The nodes of a merged tree that stay.
+fn keep(nodes: &[Binary], leaf_count: usize, has_colors: bool) -> Raised {
+    let mut kept = Vec::with_capacity(leaf_count * 3 / 2);
+    let mut colors = Vec::with_capacity(if has_colors { leaf_count * 3 / 2 } else { 0 });
     let mut queue = VecDeque::from([0u32]);
     while let Some(index) = queue.pop_front() {
-        kept.push(Kept::of(&nodes, index as usize));
+        kept.push(Kept::of(nodes, index as usize));
         if has_colors {
             colors.push(packed_color(nodes[index as usize].mean_color));
         }
-        queue.extend(ChildList::of(&nodes, index as usize).as_slice());
+        queue.extend(ChildList::of(nodes, index as usize).as_slice());
     }
     Raised { root: Binary { units: 1, ..nodes[0] }, kept, colors }
 }

@@ -49,7 +49,7 @@ pub(super) fn divide(
         })
         .map_err(BuildError::Scratch)?;
     match leaves {
-        Spool::Memory(mut all) => division.block(&mut all).map_err(BuildError::Scratch)?,
+        Spool::Memory(mut all) => division.block(&mut all, extent).map_err(BuildError::Scratch)?,
         file => division.set(file, extent)?,
     }
     let Division { mut chunks, shape, roots, .. } = division;
@@ -76,7 +76,7 @@ impl Division<'_> {
             let mut all = Vec::new();
             leaves.read_vec(0, leaves.len() as usize, &mut all).map_err(BuildError::Scratch)?;
             drop(leaves);
-            return self.block(&mut all).map_err(BuildError::Scratch);
+            return self.block(&mut all, extent).map_err(BuildError::Scratch);
         }
         let Some(plane) = extent.plane() else {
             return Err(BuildError::Crowd { vertices: leaves.len(), most: at_once });
@@ -101,17 +101,17 @@ impl Division<'_> {
     }
 
     /// A set of leaves in memory.
-    fn block(&mut self, leaves: &mut [Leaf]) -> io::Result<()> {
+    fn block(&mut self, leaves: &mut [Leaf], extent: Extent) -> io::Result<()> {
         let count = leaves.len() as u64;
         // So much at a time that finished chunks do not pile up before they are put away.
         if leaves.len() > self.plan.leaves_at_once() {
             self.shape.push(false);
-            let middle = tree::split(leaves);
+            let (middle, [left_extent, right_extent]) = tree::split(leaves, extent);
             let (left, right) = leaves.split_at_mut(middle);
-            self.block(left)?;
-            return self.block(right);
+            self.block(left, left_extent)?;
+            return self.block(right, right_extent);
         }
-        let part = raise_all(leaves, self.has_colors);
+        let part = raise_all(leaves, extent, self.has_colors);
         self.shape.extend(part.shape);
         for raised in part.raised {
             self.chunks.kept.push(&raised.kept)?;
@@ -147,13 +147,14 @@ struct Part {
     shape: Vec<bool>,
 }
 
-fn raise_all(leaves: &mut [Leaf], has_colors: bool) -> Part {
+fn raise_all(leaves: &mut [Leaf], extent: Extent, has_colors: bool) -> Part {
     if leaves.len() <= MAX_LEAVES {
         return Part { raised: vec![chunk::raise(leaves, has_colors)], shape: vec![true] };
     }
-    let middle = tree::split(leaves);
+    let (middle, [left_extent, right_extent]) = tree::split(leaves, extent);
     let (left, right) = leaves.split_at_mut(middle);
-    let (left, right) = rayon::join(|| raise_all(left, has_colors), || raise_all(right, has_colors));
+    let (left, right) =
+        rayon::join(|| raise_all(left, left_extent, has_colors), || raise_all(right, right_extent, has_colors));
     Part {
         raised: left.raised.into_iter().chain(right.raised).collect(),
         shape: [false].into_iter().chain(left.shape).chain(right.shape).collect(),

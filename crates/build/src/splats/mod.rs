@@ -8,7 +8,7 @@
 //!          a vertex   65,536     midpoint  a node          top-down     families
 //! ```
 //!
-//! What grows with the model lies in spools, in memory or on disk as the [`plan`] has it; the rest is the size of a chunk.
+//! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk.
 //!
 //! What always holds: each decoded sphere encloses the true sphere of its node, and with it all true leaves below; each
 //! node's cone holds the cones of its children as decoded, and a leaf's cone the normals of all triangles at its vertex.

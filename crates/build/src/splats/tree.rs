@@ -82,23 +82,25 @@ impl Binary {
     }
 }
 
-/// Builds the tree of at least one leaf; `leaves` are reordered.
-pub(super) fn build(leaves: &mut [Leaf]) -> Vec<Binary> {
-    let mut nodes = vec![Binary::BLANK; leaves.len() * 2 - 1];
-    subtree(leaves, &mut nodes);
-    nodes
+/// Builds the tree of at least one leaf into `nodes`, replacing what they were; `leaves` are reordered.
+pub(super) fn build(leaves: &mut [Leaf], nodes: &mut Vec<Binary>) {
+    nodes.clear();
+    nodes.resize(leaves.len() * 2 - 1, Binary::BLANK);
+    let extent = leaves.iter().fold(Extent::EMPTY, Extent::including);
+    subtree(leaves, extent, nodes);
 }
 
-fn subtree(leaves: &mut [Leaf], nodes: &mut [Binary]) -> Costs {
+fn subtree(leaves: &mut [Leaf], extent: Extent, nodes: &mut [Binary]) -> Costs {
     let (node, below) = nodes.split_first_mut().expect("a subtree has at least one node");
     if let [leaf] = leaves {
         *node = Binary::of_leaf(leaf);
         return Costs::LEAF;
     }
-    let middle = split(leaves);
+    let (middle, [left_extent, right_extent]) = split(leaves, extent);
     let (left_leaves, right_leaves) = leaves.split_at_mut(middle);
     let (left, right) = below.split_at_mut(2 * middle - 1);
-    let (costs, plan) = Costs::merge(subtree(left_leaves, left), subtree(right_leaves, right));
+    let left_costs = subtree(left_leaves, left_extent, left);
+    let (costs, plan) = Costs::merge(left_costs, subtree(right_leaves, right_extent, right));
     *node = Binary::around(&left[0], &right[0], plan);
     costs
 }
@@ -147,20 +149,25 @@ impl Plane {
     }
 }
 
-/// Reorders the leaves into two halves, neither empty; returns where the second begins.
-pub(super) fn split(leaves: &mut [Leaf]) -> usize {
-    match leaves.iter().fold(Extent::EMPTY, Extent::including).plane() {
-        Some(plane) => partition(leaves, |leaf| plane.is_left(leaf)),
-        None => {
-            // All in one place: any order will do that does not depend on the one they came in.
-            leaves.sort_unstable_by_key(|leaf| (leaf.radius.to_bits(), leaf.normal, leaf.cone, leaf.color));
-            leaves.len() / 2
-        }
-    }
+/// Reorders the leaves, whose box is `extent`, into two halves, neither empty; returns where the second begins, and their boxes.
+pub(super) fn split(leaves: &mut [Leaf], extent: Extent) -> (usize, [Extent; 2]) {
+    let Some(plane) = extent.plane() else {
+        // All in one place: any order will do that does not depend on the one they came in.
+        leaves.sort_unstable_by_key(|leaf| (leaf.radius.to_bits(), leaf.normal, leaf.cone, leaf.color));
+        return (leaves.len() / 2, [extent; 2]);
+    };
+    let mut halves = [Extent::EMPTY; 2];
+    let middle = partition(leaves, |leaf| {
+        let is_left = plane.is_left(leaf);
+        let half = &mut halves[usize::from(!is_left)];
+        *half = half.including(leaf);
+        is_left
+    });
+    (middle, halves)
 }
 
 /// Moves the elements that `belongs_left` in front of the others; returns their number.
-fn partition<T>(elements: &mut [T], belongs_left: impl Fn(&T) -> bool) -> usize {
+fn partition<T>(elements: &mut [T], mut belongs_left: impl FnMut(&T) -> bool) -> usize {
     let (mut low, mut high) = (0, elements.len());
     loop {
         while low < high && belongs_left(&elements[low]) {

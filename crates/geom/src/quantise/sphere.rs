@@ -130,10 +130,9 @@ pub fn encode(parent: &Sphere, child: &Sphere) -> (u16, Sphere) {
         let least = ((child.radius * scale).ceil()).clamp(1.0, GRID as f32);
         for s in least as usize..GRID {
             let places = (GRID + 1 - s) as f32;
-            // Nearest corner on each axis: centre = 2 · corner + s − 13.
-            let corner =
-                ((center + (GRID as f32 - s as f32)) * 0.5).round().clamp(Vec3::ZERO, Vec3::splat(places - 1.0));
-            let [x, y, z] = corner.to_array().map(|at| at as usize);
+            // Nearest corner on each axis: centre = 2 · corner + s − 13. Truncation rounds what is not negative down.
+            let corner = ((center + (GRID as f32 - s as f32)) * 0.5).clamp(Vec3::ZERO, Vec3::splat(places - 1.0));
+            let [x, y, z] = corner.to_array().map(|at| (at + 0.5) as usize);
             let places = GRID + 1 - s;
             let code = tables.code[tables.first[s] + (x * places + y) * places + z];
             if code != NONE {

@@ -2,7 +2,7 @@
 //!
 //! A field is coded after what it depends on: the tree bits and the cone first, then the normal relative to its siblings',
 //! then the sphere, whose place across the surface follows from the normal and its places along it. The same walk serves
-//! counting, coding and decoding ([`Coder`]), so they cannot disagree about a context.
+//! counting, coding and decoding (`Coder`), so they cannot disagree about a context.
 //!
 //! What always holds: any page decodes to itself; any bytes decode to a page or to an error.
 

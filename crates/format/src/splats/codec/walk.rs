@@ -220,7 +220,7 @@ fn ball<C: Coder>(
     let on_plane = -(normal[along_1] * cells.doubled_offset(along_1) as f32
         + normal[along_2] * cells.doubled_offset(along_2) as f32)
         / normal[across];
-    let guess = ((on_plane + f32::from(places - 1)) * 0.5).round().clamp(0.0, f32::from(places - 1)) as u8;
+    let guess = (((on_plane + f32::from(places - 1)) * 0.5).clamp(0.0, f32::from(places - 1)) + 0.5) as u8;
     let step = || (given().corner[across] + places - guess) % places;
     let step = coder.symbol(first::ACROSS + by_edge * 2 + inner, step)?;
     if step >= places {
