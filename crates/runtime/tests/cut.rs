@@ -3,7 +3,8 @@
 mod common;
 
 use common::{camera, open, scene, statue, statue_bytes};
-use gigalod_format::splats::{PageId, SplatFile, WordIndex};
+use gigalod_format::splats::page::CODEC_RAW;
+use gigalod_format::splats::{PageContents, PageId, PageRecord, Skeleton, SplatFile, WordIndex};
 use gigalod_runtime::splats::{Culled, CutSink, Cutting, VisitedNode, Work, cut};
 use gigalod_runtime::{CutReport, FileId, Limit, ModelView, Scene, SelectInput, Similarity, ViewId};
 use std::collections::BTreeMap;
@@ -161,26 +162,33 @@ fn a_page_that_is_damaged_is_told_and_its_parents_are_drawn() {
 
 #[test]
 fn tree_bits_that_lie_end_the_traversal_instead_of_running_on() {
-    // Every node of a page claims four children: sizes and checksums are made right, the tree is not.
+    // Every node of the last page claims four children: sizes and checksums are made right, the tree is not.
     let file = statue();
-    let mut bytes = statue_bytes().to_vec();
-    let records = file.skeleton().pages().to_vec();
-    let page = PageId(records.len() as u32 - 1);
-    let start = file.skeleton().page_offset(page) as usize;
-    let groups = u32::from_le_bytes(bytes[start..start + 4].try_into().unwrap()) as usize;
-    let nodes = start + 4 + groups.div_ceil(4);
-    for node in 0..usize::from(records[page.0 as usize].nodes) {
-        bytes[nodes + node * 4] |= 6;
+    let mut records = file.skeleton().pages().to_vec();
+    let mut pages = Vec::new();
+    for (number, record) in records.iter_mut().enumerate() {
+        let page = PageId(number as u32);
+        let start = file.skeleton().page_offset(page) as usize;
+        let coded = &statue_bytes()[start..start + record.bytes as usize];
+        let mut contents = PageContents::decode(coded, file.skeleton(), page).unwrap();
+        if number + 1 == file.skeleton().pages().len() {
+            contents.nodes.iter_mut().for_each(|node| node.0 |= 6);
+        }
+        let bytes = contents.encode();
+        *record = PageRecord {
+            bytes: bytes.len() as u32,
+            checksum: gigalod_format::checksum(&bytes),
+            codec: CODEC_RAW,
+            ..*record
+        };
+        pages.push(bytes);
     }
-    let mut changed = records.clone();
-    let end = start + records[page.0 as usize].bytes as usize;
-    changed[page.0 as usize].checksum = gigalod_format::checksum(&bytes[start..end]);
-    let skeleton = gigalod_format::splats::Skeleton::encode(file.skeleton().root(), &changed, None);
+    let skeleton = Skeleton::encode(file.skeleton().root(), &records, None);
     let metadata = file.container().read_metadata().unwrap();
     let mut out = std::io::Cursor::new(Vec::new());
     let mut writer =
         gigalod_format::Writer::new(&mut out, gigalod_format::Kind::Splats, skeleton.len() as u64).unwrap();
-    writer.page(&bytes[file.skeleton().page_offset(PageId(0)) as usize..end]).unwrap();
+    pages.iter().for_each(|page| writer.page(page).unwrap());
     writer.finish(&skeleton, &metadata).unwrap();
     let mut scene = scene(open(out.into_inner()), 1 << 30);
     let camera = camera(&scene, 0.0, 0.5);
