@@ -173,6 +173,20 @@ fn bytes_do_not_depend_on_the_memory() {
 }
 
 #[test]
+fn a_crowd_that_no_plane_can_separate_needs_memory_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.glod");
+    let positions = vec![[1.0, 2.0, 3.0]; 70_000];
+    let triangles: Vec<[u32; 3]> = (0..69_998).map(|i| [i, i + 1, i + 2]).collect();
+    let options = |memory_bytes| Options { memory_bytes, ..Options::default() };
+    let error = build(FromMemory::new(&positions, &triangles), &options(1 << 20), &out).unwrap_err();
+    assert_eq!(error.to_string(), "70000 vertices in one place, expected at most 65536 within this budget");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
+    build(FromMemory::new(&positions, &triangles), &options(1 << 30), &out).unwrap();
+    assert_eq!(open(&out).skeleton().root().leaves, 70_000);
+}
+
+#[test]
 fn a_tree_of_several_chunks_is_sound() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.glod");

@@ -19,7 +19,7 @@ use glam::Vec3;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-/// Leaves of a chunk at most: 15 MB of binary tree while it is built, and pages of its lower levels are well filled.
+/// Leaves of a chunk at most: 7 MB of binary tree while it is built, and pages of its lower levels are well filled.
 pub(super) const MAX_LEAVES: usize = 1 << 16;
 
 /// A node of the hierarchy whose sphere is not quantised yet.

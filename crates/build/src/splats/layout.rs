@@ -157,7 +157,7 @@ impl<'a> Tree<'a> {
             }
             runs = next;
         }
-        pager.end();
+        pager.end_page();
         visit(&pager.full)?;
         pager.full.clear();
         Ok(pager)

@@ -84,7 +84,8 @@ impl Pager {
         }
     }
 
-    fn end_page(&mut self) {
+    /// The page is full, or the walk is over.
+    pub(super) fn end_page(&mut self) {
         self.records.push(PageRecord {
             bytes: 0,
             checksum: 0,
@@ -97,11 +98,6 @@ impl Pager {
         self.has_claim = false;
         self.words = 0;
         self.full.push(std::mem::take(&mut self.contents));
-    }
-
-    /// Ends the last page.
-    pub(super) fn end(&mut self) {
-        self.end_page();
     }
 
     /// Records of all pages; `bytes`, `checksum` and `codec` are still to come.

@@ -81,9 +81,8 @@ pub(super) fn top_down(
 
     // Children before parents: how far what hangs from the tree on top reaches.
     let mut reaches = reaches.into_iter();
-    for (index, node) in top.iter().enumerate().filter(|(_, node)| node.units == 1) {
+    for (index, _) in top.iter().enumerate().filter(|(_, node)| node.units == 1) {
         reach[index] = reaches.next().expect("a reach for each chunk");
-        debug_assert!(node.units == 1);
     }
     for index in order.iter().rev() {
         let parent = &top[*index].sphere;

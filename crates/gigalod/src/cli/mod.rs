@@ -47,7 +47,7 @@ pub(crate) fn run() -> ExitCode {
         eprintln!("interrupted");
         std::process::exit(130);
     });
-    let console = progress::Console::new(cli.json, cli.verbose);
+    let console = progress::Console::new(cli.verbose);
     let outcome = match &cli.command {
         Command::Build(args) => build::run(args, &console),
         Command::Render(args) => render::run(args, &console),

@@ -19,7 +19,7 @@ pub(crate) struct Console {
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 impl Console {
-    pub(crate) fn new(_json: bool, verbose: bool) -> Self {
+    pub(crate) fn new(verbose: bool) -> Self {
         Self { verbose, on_terminal: std::io::stderr().is_terminal() }
     }
 
@@ -40,7 +40,7 @@ impl Console {
         }
     }
 
-    /// Progress of one piece of work; `unit_is_bytes` decides how numbers are shown.
+    /// Progress of one piece of work.
     pub(crate) fn work(&self, name: &str) -> Work<'_> {
         Work { console: self, name: name.to_string(), state: Mutex::new(None) }
     }

@@ -16,7 +16,7 @@
 @group(0) @binding(1) var albedo_texture: texture_2d<f32>;
 @group(0) @binding(2) var normal_texture: texture_2d<f32>;
 
-// Sine of the angle beyond the horizon, about 14°.
+// Sine of the angle beyond the horizon, about 14°. Chosen by eye, on the statue's nose; on open scans it costs up to 0.2 dB.
 const GRAZING: f32 = 0.25;
 
 @vertex
