@@ -5,11 +5,12 @@ mod common;
 use common::{SIZE, built, draw, mesh, renderer, scan, scene, twelve_directions};
 use gigalod::geom::Camera;
 use gigalod::geom::camera::UpAxis;
-use gigalod::render::{Kernel, Lighting, Picture};
+use gigalod::render::{Kernel, Lighting, Picture, Renderer};
 use gigalod::runtime::splats::{Cutting, MATERIAL_SRGB};
 use gigalod_reference::judge::{Drawn, judge};
 use gigalod_reference::raytrace::supersampled_coverage;
 use gigalod_reference::{Bvh, Shading, Truth, metrics, shade};
+use std::path::{Path, PathBuf};
 
 fn rgb(picture: &Picture) -> gigalod_reference::Picture {
     let pixels = picture.rgba.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
@@ -17,10 +18,14 @@ fn rgb(picture: &Picture) -> gigalod_reference::Picture {
 }
 
 fn has_no_holes_and_no_fat(model: &str) {
-    let (Some(path), Some(mut renderer)) = (scan(model), renderer()) else { return };
+    let (Some(path), Some(renderer)) = (scan(model), renderer()) else { return };
+    is_covered_from_twelve_sides(model, &path, renderer);
+}
+
+fn is_covered_from_twelve_sides(model: &str, path: &Path, mut renderer: Renderer) {
     let folder = tempfile::tempdir().unwrap();
-    let mut scene = scene(built(&path, folder.path()));
-    let mesh = mesh(&path);
+    let mut scene = scene(built(path, folder.path()));
+    let mesh = mesh(path);
     let bvh = Bvh::build(&mesh);
     let mut psnr = [vec![], vec![]];
     for orbit_deg in twelve_directions() {
@@ -102,15 +107,30 @@ fn bunny_has_no_holes_close_up_at_grazing_angles_and_from_inside() {
     }
 }
 
+/// A closed statue, so that what shows its back is left out.
+fn closed_statue(folder: &Path, triangles: u64) -> PathBuf {
+    let ply = folder.join("statue.ply");
+    let options = gigalod::synth::StatueOptions { triangles, seed: 2, ..gigalod::synth::StatueOptions::default() };
+    let mut file = std::fs::File::create(&ply).unwrap();
+    gigalod::synth::write_statue(options, &mut file, &mut |_, _| {}).unwrap();
+    ply
+}
+
+/// The scans are open, and drawn from both sides; here what shows its back is left out.
+#[test]
+fn a_closed_statue_has_no_holes_and_no_fat_from_twelve_sides() {
+    let Some(renderer) = renderer() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let ply = closed_statue(folder.path(), 400_000);
+    assert!(built(&ply, folder.path()).skeleton().root().closed);
+    is_covered_from_twelve_sides("closed statue", &ply, renderer);
+}
+
 #[test]
 fn culling_never_changes_the_picture() {
     let Some(mut renderer) = renderer() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let ply = folder.path().join("statue.ply");
-    let options =
-        gigalod::synth::StatueOptions { triangles: 40_000, seed: 2, ..gigalod::synth::StatueOptions::default() };
-    let mut file = std::fs::File::create(&ply).unwrap();
-    gigalod::synth::write_statue(options, &mut file, &mut |_, _| {}).unwrap();
+    let ply = closed_statue(folder.path(), 40_000);
     let mut scene = scene(built(&ply, folder.path()));
     for (orbit_deg, zoom, threshold_px) in
         [([0.0, 0.0], 1.0, 1.0), ([40.0, 10.0], 5.0, 2.0), ([200.0, -30.0], 2.0, 12.0)]

@@ -2,10 +2,13 @@
 //!
 //! * Each vertex' true sphere (largest bounding sphere of the triangles around it, computed here anew) must be enclosed by
 //!   every decoded sphere on some path from the root to a leaf.
+//! * Each triangle's normal must lie in every cone on such a path for each of its corners, or culling could hide its front.
 //! * Each sample of the surface must lie in some leaf's decoded sphere.
 //! * No point of a decoded sphere may be farther from the surface than the node's stored error, twice its radius.
 
 use super::structure::SplatTree;
+use gigalod_format::splats::Node;
+use gigalod_geom::quantise::{cone, normal};
 use gigalod_geom::sphere::triangle_bounding_radius;
 use gigalod_reference::{Bvh, Mesh};
 use glam::{DVec3, Vec3};
@@ -14,13 +17,15 @@ use rayon::prelude::*;
 /// Distances in model units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
-    /// Largest distance found between the surface and the spheres drawn with `--full`, both ways.
+    /// Largest distance found of points on the leaves' spheres from the surface. The other way it is 0: what of the surface lies
+    /// in no leaf counts as a violation.
     pub hausdorff: f64,
     /// Root mean square of the distances of points on those spheres from the surface.
     pub rms: f64,
     /// Largest ratio of a node's distance, bounded from above, to its stored error; at most 1 in a sound file.
     pub worst_ratio: f64,
-    /// Vertices whose sphere is not enclosed, samples that are not covered, and nodes beyond their stored error.
+    /// Vertices whose sphere is not enclosed, corners whose triangle's normal is in no cone, samples that are not covered, and
+    /// nodes beyond their stored error.
     pub violations: u64,
 }
 
@@ -32,6 +37,7 @@ pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> Measured {
     let bvh = Bvh::build(mesh);
     let enclosed = count_unenclosed_vertices(tree, origin, mesh);
     let uncovered = count_uncovered_samples(tree, origin, mesh);
+    let hidden = count_hidden_fronts(tree, origin, mesh);
 
     let per_node: Vec<NodeDistances> = tree
         .nodes
@@ -64,7 +70,7 @@ pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> Measured {
         hausdorff: per_node.iter().map(|node| node.farthest).fold(0.0, f64::max),
         rms: (squares / (leaves * DIRECTIONS.len()) as f64).sqrt(),
         worst_ratio: per_node.iter().map(|node| node.ratio).fold(0.0, f64::max),
-        violations: enclosed + uncovered + beyond,
+        violations: enclosed + uncovered + hidden + beyond,
     }
 }
 
@@ -91,6 +97,19 @@ fn count_unenclosed_vertices(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u6
     radii.par_iter().enumerate().filter(|(vertex, radius)| missing((*vertex, radius))).count() as u64
 }
 
+/// Number of triangles' corners whose normal no path of spheres and cones holds.
+fn count_hidden_fronts(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
+    let is_hidden = |triangle: &[u32; 3]| {
+        let corners = triangle.map(|vertex| mesh.positions()[vertex as usize]);
+        // Triangles without an area have no front.
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
+        let radius = triangle_bounding_radius(corners);
+        let hidden = |corner: &&DVec3| !has_path(tree, **corner - origin, radius, Some(normal));
+        Some(corners.iter().filter(hidden).count() as u64)
+    };
+    mesh.triangles().par_iter().filter_map(is_hidden).sum()
+}
+
 /// Number of surface samples (corners, middles of edges, barycentre of each triangle) outside all leaves.
 fn count_uncovered_samples(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
     mesh.triangles()
@@ -107,11 +126,19 @@ fn count_uncovered_samples(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 
 
 /// True when a path from the root to a leaf encloses the ball all the way; local space.
 fn has_enclosing_path(tree: &SplatTree, center: DVec3, radius: f64) -> bool {
+    has_path(tree, center, radius, None)
+}
+
+/// True when the spheres of a path from the root to a leaf enclose the ball all the way, and its cones hold `normal`, if any.
+fn has_path(tree: &SplatTree, center: DVec3, radius: f64, normal: Option<DVec3>) -> bool {
     let mut stack = vec![0u32];
     while let Some(index) = stack.pop() {
         let node = &tree.nodes[index as usize];
         let reach = f64::from(node.sphere.radius) - radius;
         if reach < 0.0 || (node.sphere.center.as_dvec3() - center).length_squared() > reach * reach {
+            continue;
+        }
+        if normal.is_some_and(|normal| !cone_holds(node.node, normal)) {
             continue;
         }
         if node.children == 0 {
@@ -120,4 +147,10 @@ fn has_enclosing_path(tree: &SplatTree, center: DVec3, radius: f64) -> bool {
         stack.extend(node.first_child..node.first_child + u32::from(node.children));
     }
     false
+}
+
+/// True when a unit vector lies in the node's cone, within a hundred-thousandth.
+fn cone_holds(node: Node, direction: DVec3) -> bool {
+    let cosine = normal::decode(node.normal()).as_dvec3().dot(direction);
+    cosine >= f64::from(cone::cosine(node.cone())) - 1e-5
 }

@@ -1,4 +1,4 @@
-//! The judge of finished files: shares no code with the builders, and walks a file its own slow way.
+//! The judge of finished files: shares nothing with the builders but `geom` and `format`, and walks a file its own slow way.
 //!
 //! [`structure::check`] reads every byte and every tree bit; [`measure::against`] holds the decoded spheres against the
 //! original mesh.

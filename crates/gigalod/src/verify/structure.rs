@@ -1,7 +1,7 @@
 //! Every page, every group, every tree bit of a splat file, in breadth-first order.
 //!
-//! Takes an open file; returns the problems and, if there are none, the tree with its decoded spheres. Memory: 32 bytes a
-//! node, for the tree is what the measurements need.
+//! Takes an open file; returns the problems and, if there are none, the tree with its decoded spheres. Memory: a
+//! [`TreeNode`] for each node, for the tree is what the measurements need.
 
 use super::Problems;
 use gigalod_format::splats::page::FamilyStart;
@@ -19,8 +19,6 @@ pub struct TreeNode {
     pub first_child: u32,
     /// Number of children.
     pub children: u8,
-    /// 0 for the root; saturates.
-    pub level: u8,
     /// As stored.
     pub node: Node,
 }
@@ -135,7 +133,7 @@ impl Walk<'_> {
         true
     }
 
-    /// Checks that a family begins where the page above it says, and that it does not straddle two pages.
+    /// Checks that a family begins where the page above it says. (That it ends in the same page, `read_page` has checked.)
     fn begin_family(&mut self, page: PageId, word: u32) {
         let number = self.begun_families;
         self.begun_families += 1;
@@ -172,13 +170,7 @@ impl Walk<'_> {
             if children.count > 0 {
                 self.expected.push_back(ExpectedGroup { parent: Some(index), children, family: self.families });
             }
-            self.tree.nodes.push(TreeNode {
-                sphere: ball,
-                first_child: 0,
-                children: children.count,
-                level: parent.map_or(0, |parent| parent.level.saturating_add(1)),
-                node: *node,
-            });
+            self.tree.nodes.push(TreeNode { sphere: ball, first_child: 0, children: children.count, node: *node });
         }
     }
 
