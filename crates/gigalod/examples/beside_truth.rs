@@ -10,11 +10,12 @@ use gigalod::build::{NoProgress, Options, splats};
 use gigalod::format::splats::SplatFile;
 use gigalod::format::{Container, FileStore};
 use gigalod::geom::{Camera, ImageSize};
-use gigalod::import::Batch;
+use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Lighting, Look, Renderer};
 use gigalod::runtime::residency::InlineLoader;
 use gigalod::runtime::splats::MATERIAL_SRGB;
 use gigalod::runtime::{Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::verify;
 use gigalod_reference::judge::{Drawn, judge};
 use gigalod_reference::raytrace::supersampled_coverage;
 use gigalod_reference::{Bvh, Mesh, Picture, Shading, Truth, metrics, shade};
@@ -77,16 +78,7 @@ fn main() -> Result<()> {
 
 fn read(path: &Path) -> Result<Mesh> {
     let mut stream = gigalod::import::open(Box::new(File::open(path).context(path.display().to_string())?))?;
-    let (mut positions, mut normals, mut colors, mut triangles) = (vec![], vec![], vec![], vec![]);
-    let mut batch = Batch::default();
-    while stream.next(&mut batch)? {
-        positions.append(&mut batch.vertices.positions);
-        normals.append(&mut batch.vertices.normals);
-        colors.append(&mut batch.vertices.colors);
-        triangles.append(&mut batch.triangles);
-    }
-    let has = stream.attributes();
-    Ok(Mesh::new(positions, has.normals.then_some(normals), has.colors.then_some(colors), triangles)?)
+    Ok(verify::mesh_of(read_all(&mut *stream, &mut |_, _| {})?)?)
 }
 
 fn write_sheet(path: &Path, pictures: [&Vec<[u8; 3]>; 3]) -> Result<()> {

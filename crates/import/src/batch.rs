@@ -1,5 +1,6 @@
 //! The unit that streams: a bounded number of vertices and triangles, its buffers reused from one batch to the next.
 
+use crate::{ImportError, ModelStream};
 use glam::{DVec3, Vec3};
 
 /// What the vertices of a stream carry besides positions.
@@ -47,4 +48,22 @@ impl Batch {
     pub fn is_full(&self) -> bool {
         self.vertices.positions.len() >= Self::TARGET || self.triangles.len() >= Self::TARGET
     }
+}
+
+/// A whole model in one batch, for those that need all of it at once: the judge, and copies of a scan. `progress` is told
+/// [`ModelStream::bytes_consumed`]. Memory grows with the model.
+///
+/// # Errors
+/// The first thing that is wrong with the file.
+pub fn read_all(stream: &mut dyn ModelStream, progress: &mut dyn FnMut(u64, u64)) -> Result<Batch, ImportError> {
+    let (mut all, mut batch) = (Batch::default(), Batch::default());
+    while stream.next(&mut batch)? {
+        all.vertices.positions.append(&mut batch.vertices.positions);
+        all.vertices.normals.append(&mut batch.vertices.normals);
+        all.vertices.colors.append(&mut batch.vertices.colors);
+        all.triangles.append(&mut batch.triangles);
+        let (done, total) = stream.bytes_consumed();
+        progress(done, total);
+    }
+    Ok(all)
 }

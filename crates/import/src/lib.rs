@@ -14,7 +14,7 @@ mod input;
 mod open;
 pub mod ply;
 
-pub use batch::{Attributes, Batch, VertexBatch};
+pub use batch::{Attributes, Batch, VertexBatch, read_all};
 pub use error::{ImportError, Item, Place, Position, Problem};
 pub use open::open;
 

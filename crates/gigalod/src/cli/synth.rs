@@ -6,7 +6,7 @@ use super::parse::readable_bytes;
 use super::progress::Console;
 use super::{files, path_file};
 use gigalod_build::Progress;
-use gigalod_import::Batch;
+use gigalod_import::read_all;
 use gigalod_synth::{
     Order, PathKind, PathOptions, ReplicaOptions, Scan, StatueOptions, SynthError, Written, camera_path, write_replicas,
 };
@@ -110,16 +110,13 @@ fn generate(
 
 fn read_scan(path: &Path) -> Result<Scan, CliError> {
     let mut stream = files::open_model(path)?;
-    let mut scan = Scan { colors: stream.attributes().colors.then(Vec::new), ..Scan::default() };
-    let mut batch = Batch::default();
-    while stream.next(&mut batch).map_err(|error| CliError::import(path, &error))? {
-        scan.positions.extend(batch.vertices.positions.iter().map(|position| position.as_vec3().to_array()));
-        scan.triangles.extend(&batch.triangles);
-        if let Some(colors) = &mut scan.colors {
-            colors.extend(&batch.vertices.colors);
-        }
-    }
-    Ok(scan)
+    let all = read_all(&mut *stream, &mut |_, _| {}).map_err(|error| CliError::import(path, &error))?;
+    let colors = all.vertices.colors;
+    Ok(Scan {
+        positions: all.vertices.positions.iter().map(|position| position.as_vec3().to_array()).collect(),
+        triangles: all.triangles,
+        colors: (!colors.is_empty()).then_some(colors),
+    })
 }
 
 fn path(args: &PathArgs) -> Result<(u64, usize), CliError> {

@@ -6,7 +6,7 @@ use super::files;
 use super::progress::Console;
 use gigalod::verify::{self, Measured, Problems};
 use gigalod_build::Progress;
-use gigalod_import::Batch;
+use gigalod_import::read_all;
 use gigalod_reference::Mesh;
 use serde::Serialize;
 use std::fmt::Write;
@@ -101,16 +101,6 @@ fn judge(measured: &Measured, mesh: &Mesh, leaves: u64, problems: &mut Problems)
 fn read_mesh(path: &Path, work: &dyn Progress) -> Result<Mesh, CliError> {
     let mut stream = files::open_model(path)?;
     work.begin("read", stream.bytes_consumed().1);
-    let (mut positions, mut normals, mut colors, mut triangles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut batch = Batch::default();
-    while stream.next(&mut batch).map_err(|error| CliError::import(path, &error))? {
-        positions.append(&mut batch.vertices.positions);
-        normals.append(&mut batch.vertices.normals);
-        colors.append(&mut batch.vertices.colors);
-        triangles.append(&mut batch.triangles);
-        work.at(stream.bytes_consumed().0);
-    }
-    let attributes = stream.attributes();
-    Mesh::new(positions, attributes.normals.then_some(normals), attributes.colors.then_some(colors), triangles)
-        .map_err(|error| CliError::in_file(path, error))
+    let all = read_all(&mut *stream, &mut |done, _| work.at(done)).map_err(|error| CliError::import(path, &error))?;
+    verify::mesh_of(all).map_err(|error| CliError::in_file(path, error))
 }

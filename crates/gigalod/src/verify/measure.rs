@@ -10,6 +10,8 @@ use super::structure::SplatTree;
 use gigalod_format::splats::Node;
 use gigalod_geom::quantise::{cone, normal};
 use gigalod_geom::sphere::triangle_bounding_radius;
+use gigalod_import::{Batch, VertexBatch};
+use gigalod_reference::mesh::MeshError;
 use gigalod_reference::{Bvh, Mesh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -27,6 +29,16 @@ pub struct Measured {
     /// Vertices whose sphere is not enclosed, corners whose triangle's normal is in no cone, samples that are not covered, and
     /// nodes beyond their stored error.
     pub violations: u64,
+}
+
+/// The judge's mesh of a whole model.
+///
+/// # Errors
+/// Where the judge cannot take it: coordinates beyond its range, say.
+pub fn mesh_of(model: Batch) -> Result<Mesh, MeshError> {
+    let VertexBatch { positions, normals, colors } = model.vertices;
+    let normals = (!normals.is_empty()).then_some(normals);
+    Mesh::new(positions, normals, (!colors.is_empty()).then_some(colors), model.triangles)
 }
 
 /// Points of a unit sphere at which leaves are measured.

@@ -5,10 +5,11 @@ use gigalod::build::{NoProgress, Options, splats};
 use gigalod::format::splats::SplatFile;
 use gigalod::format::{Container, FileStore};
 use gigalod::geom::{Camera, ImageSize};
-use gigalod::import::Batch;
+use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Kernel, Look, Picture, Renderer};
 use gigalod::runtime::residency::InlineLoader;
 use gigalod::runtime::{CutReport, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::verify;
 use gigalod_reference::Mesh;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -40,16 +41,7 @@ pub(crate) fn renderer() -> Option<Renderer> {
 /// A whole mesh in memory.
 pub(crate) fn mesh(path: &Path) -> Mesh {
     let mut stream = gigalod::import::open(Box::new(File::open(path).unwrap())).unwrap();
-    let (mut positions, mut normals, mut colors, mut triangles) = (vec![], vec![], vec![], vec![]);
-    let mut batch = Batch::default();
-    while stream.next(&mut batch).unwrap() {
-        positions.append(&mut batch.vertices.positions);
-        normals.append(&mut batch.vertices.normals);
-        colors.append(&mut batch.vertices.colors);
-        triangles.append(&mut batch.triangles);
-    }
-    let has = stream.attributes();
-    Mesh::new(positions, has.normals.then_some(normals), has.colors.then_some(colors), triangles).unwrap()
+    verify::mesh_of(read_all(&mut *stream, &mut |_, _| {}).unwrap()).unwrap()
 }
 
 /// Builds `model` as splats into `folder`; opens the result.
