@@ -2,6 +2,7 @@
 
 use gigalod_import::ImportError;
 use std::io;
+use std::path::PathBuf;
 
 /// Why a model could not be built.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,24 @@ pub enum BuildError {
     /// A temporary file could not be written or read back.
     #[error("could not use temporary files: {0}")]
     Scratch(#[source] io::Error),
+    /// Two builds of one output.
+    #[error("another build is working in {}", .folder.display())]
+    Busy {
+        /// Where.
+        folder: PathBuf,
+    },
+    /// What is to be continued is not what was begun.
+    #[error("the build in {} was {what}: expected {expected}, found {found}; remove the folder or run without --resume", .folder.display())]
+    OtherBuild {
+        /// Where.
+        folder: PathBuf,
+        /// The kind of difference, as "of another input".
+        what: &'static str,
+        /// As it was begun.
+        expected: String,
+        /// As it is to be continued.
+        found: String,
+    },
     /// What no plane can separate has to be sorted in memory.
     #[error("{vertices} vertices in one place, expected at most {most} within this budget")]
     Crowd {

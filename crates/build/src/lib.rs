@@ -5,14 +5,21 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod input;
+mod journal;
 mod output;
 mod progress;
 pub mod splats;
 mod spool;
+mod unfinished;
+mod work;
 
 pub use error::BuildError;
+pub use input::InputIdentity;
 pub use output::Output;
 pub use progress::{NoProgress, PhaseTime, Progress, Report};
+pub use unfinished::abandon;
+pub use work::{can_continue, work_folder};
 
 use gigalod_geom::camera::UpAxis;
 
@@ -25,6 +32,11 @@ pub struct Options {
     pub threads: usize,
     /// Overrides the format's convention.
     pub up: Option<UpAxis>,
+    /// What is built. Where it is given, a build that does not fit into memory can be continued by another process: what it
+    /// has lies in [`work_folder`].
+    pub input: Option<InputIdentity>,
+    /// Continue what an interrupted build has left, if anything.
+    pub resume: bool,
 }
 
 impl Options {
@@ -34,6 +46,6 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { memory_bytes: 2 << 30, threads: 0, up: None }
+        Self { memory_bytes: 2 << 30, threads: 0, up: None, input: None, resume: false }
     }
 }

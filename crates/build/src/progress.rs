@@ -9,6 +9,8 @@ pub trait Progress: Sync {
     fn begin(&self, phase: &'static str, total: u64);
     /// So many steps of the phase are done, in all.
     fn at(&self, done: u64);
+    /// Something that the user may want to know.
+    fn note(&self, _text: &str) {}
 }
 
 /// Nobody is watching.
@@ -36,8 +38,10 @@ pub struct Report {
     pub metadata: gigalod_format::Metadata,
     /// Length of the file.
     pub output_bytes: u64,
-    /// In order.
+    /// In order; those that this process went through.
     pub phases: Vec<PhaseTime>,
+    /// The last phase that an earlier process had finished.
+    pub resumed_after: Option<String>,
 }
 
 /// Passes progress on and takes the time of each phase.

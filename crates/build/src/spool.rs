@@ -1,34 +1,68 @@
 //! Sequences of plain records that live in memory when there is room, else in a temporary file.
 //!
-//! What always holds: a spool says the same, wherever it lives; its file has no name that could be left behind, and it is read
-//! and written by position, in large pieces.
+//! What always holds: a spool says the same, wherever it lives, and is read and written by position, in large pieces. Its file
+//! has a name only where a build that is continued may need it; what becomes of that, the work folder knows.
 
+use crate::journal::Extent;
+use crate::unfinished::registry;
+use crate::work::Work;
 use bytemuck::Pod;
 use std::fs::File;
 use std::io;
 use std::path::Path;
 
 /// Where spools live.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Place<'a> {
     /// In memory.
     Memory,
     /// In files without a name, in this folder.
     Folder(&'a Path),
+    /// In files in a work folder.
+    Work(&'a Work),
 }
 
 /// A sequence of records.
 #[derive(Debug)]
 pub(crate) enum Spool<T> {
     Memory(Vec<T>),
-    File { file: File, len: u64 },
+    File { file: File, len: u64, name: Option<&'static str> },
 }
 
 impl<T: Pod> Spool<T> {
+    /// For what no later phase needs.
     pub(crate) fn new(place: &Place<'_>) -> io::Result<Self> {
+        let folder = match place {
+            Place::Memory => return Ok(Self::Memory(Vec::new())),
+            Place::Folder(folder) => folder,
+            Place::Work(work) => work.folder(),
+        };
+        let _names = registry();
+        Ok(Self::File { file: tempfile::tempfile_in(folder)?, len: 0, name: None })
+    }
+
+    /// For what a later phase needs. No other spool of the build has the same name.
+    pub(crate) fn named(place: &Place<'_>, name: &'static str) -> io::Result<Self> {
         match place {
-            Place::Memory => Ok(Self::Memory(Vec::new())),
-            Place::Folder(folder) => Ok(Self::File { file: tempfile::tempfile_in(folder)?, len: 0 }),
+            Place::Work(work) => Ok(Self::File { file: work.create(name)?, len: 0, name: Some(name) }),
+            other => Self::new(other),
+        }
+    }
+
+    /// As an earlier process left it.
+    pub(crate) fn reopen(work: &Work, name: &'static str) -> io::Result<Self> {
+        let (file, len) = work.reopen(name, size_of::<T>() as u64)?;
+        Ok(Self::File { file, len, name: Some(name) })
+    }
+
+    /// Puts all of it on disk, for [`Work::finish`].
+    pub(crate) fn secure(&self) -> io::Result<(&'static str, Extent)> {
+        match self {
+            Self::File { file, len, name: Some(name) } => {
+                file.sync_all()?;
+                Ok((name, Extent { records: *len, record_bytes: size_of::<T>() as u64 }))
+            }
+            _ => Err(io::Error::other("a spool without a name cannot be kept")),
         }
     }
 
@@ -49,7 +83,7 @@ impl<T: Pod> Spool<T> {
     pub(crate) fn push(&mut self, records: &[T]) -> io::Result<()> {
         match self {
             Self::Memory(all) => all.extend_from_slice(records),
-            Self::File { file, len } => {
+            Self::File { file, len, .. } => {
                 write_at(file, *len * size_of::<T>() as u64, bytemuck::cast_slice(records))?;
                 *len += records.len() as u64;
             }

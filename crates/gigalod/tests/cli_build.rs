@@ -273,3 +273,51 @@ fn an_interrupted_run_leaves_nothing_behind_and_ends_with_status_130() {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{signal}");
     }
 }
+
+/// Held up in the middle of reading, by a signal that stops a process, while somebody writes to its input.
+#[cfg(unix)]
+#[test]
+fn an_input_that_changes_while_it_is_read_is_refused_for_that() {
+    let folder = tempfile::tempdir().unwrap();
+    let (ply, out) = (folder.path().join("a.ply"), folder.path().join("a.glod"));
+    // Text is read slowly.
+    let scan = cli_support::strips(700);
+    let changes: [(&str, fn(&File, u64)); 3] = [
+        ("longer", |file, bytes| file.set_len(bytes + 1).unwrap()),
+        ("shorter", |file, bytes| file.set_len(bytes - 7).unwrap()),
+        ("no longer", |file, _| file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap()),
+    ];
+    let work = folder.path().join(".a.glod.build");
+    let signal = |name: &str, run: &std::process::Child| {
+        let sent = std::process::Command::new("kill").args([name, &run.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+    };
+    for (what, change) in changes {
+        std::fs::write(&ply, &scan).unwrap();
+        let run = loop {
+            let mut build = cli_support::command();
+            build.args(["build", "--json", "-o"]).arg(&out).arg(&ply);
+            let mut run =
+                build.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+            // It knows what it reads by the time it works.
+            while !work.exists() && run.try_wait().unwrap().is_none() {
+                std::thread::yield_now();
+            }
+            signal("-STOP", &run);
+            if work.exists() && !work.join("journal").exists() {
+                break run;
+            }
+            // On a busy machine it may have read everything by now: once more.
+            run.kill().unwrap();
+            run.wait().unwrap();
+            let _ = std::fs::remove_file(&out);
+        };
+        change(&File::options().write(true).open(&ply).unwrap(), scan.len() as u64);
+        signal("-CONT", &run);
+        let ran = cli_support::Ran::of(run.wait_with_output().unwrap());
+        let said = ran.failed(&ply);
+        assert!(said.starts_with("changed while it was read (expected "), "{what}: {said}");
+        assert_eq!(ran.stderr.lines().count(), 1, "{what}: nothing to continue: {ran:?}");
+        assert_eq!(names_in(folder.path()), ["a.ply"], "{what}");
+    }
+}

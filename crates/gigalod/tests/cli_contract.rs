@@ -19,7 +19,7 @@ fn build_and_info_report_exactly_the_keys_of_the_contract() {
         shape(&ran.json()),
         format!(
             "{{cpu_seconds {INPUT} kind leaves levels nodes options{{..}} output_bytes peak_memory_bytes \
-             phases[{{name seconds}}] seconds}}"
+             phases[{{name seconds}}] resumed_after seconds}}"
         )
     );
     let ran = run!["--json", "info", statue().glod].done();

@@ -6,6 +6,7 @@
 //!
 //! What always holds: messages are one line of printable text, and bounded, whatever bytes the file has.
 
+use crate::Stamp;
 use std::{fmt, io};
 
 /// The first thing that is wrong with a file. One word wide, so that returning a result costs nothing in the inner loops.
@@ -66,6 +67,14 @@ pub enum Problem {
     Gzip {
         /// The unpacker's words.
         reason: String,
+    },
+    /// Somebody wrote to the file.
+    #[error("changed while it was read (expected {expected}, found {found})")]
+    Changed {
+        /// As it was when it was opened.
+        expected: Stamp,
+        /// As it is now.
+        found: Stamp,
     },
     /// The source of the bytes failed; the file itself may be good.
     #[error("expected to read on, found an input error: {source}")]

@@ -13,10 +13,12 @@ mod error;
 mod input;
 mod open;
 pub mod ply;
+mod watch;
 
 pub use batch::{Attributes, Batch, VertexBatch, read_all};
 pub use error::{ImportError, Item, Place, Position, Problem};
 pub use open::open;
+pub use watch::{AskStamp, Stamp, open_watched};
 
 use gigalod_geom::camera::UpAxis;
 use std::io::{Read, Seek};

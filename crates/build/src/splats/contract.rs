@@ -26,6 +26,14 @@ pub(super) struct Plan {
 impl Plan {
     /// Of a unit.
     pub(super) const NONE: Self = Self { children: 0, left_of_3: 0, left_of_4: 0 };
+
+    pub(super) fn to_bytes(self) -> [u8; 3] {
+        [self.children, self.left_of_3, self.left_of_4]
+    }
+
+    pub(super) fn of_bytes([children, left_of_3, left_of_4]: [u8; 3]) -> Self {
+        Self { children, left_of_3, left_of_4 }
+    }
 }
 
 /// No subtree of fewer leaves can be so many siblings. Small enough to add without overflow.

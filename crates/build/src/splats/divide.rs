@@ -33,10 +33,9 @@ pub(super) fn divide(
     phases: &Phases<'_>,
 ) -> Result<Chunks, BuildError> {
     phases.begin("tree", leaves.len());
-    let new = || Spool::new(&plan.place()).map_err(BuildError::Scratch);
     let chunks = Chunks {
-        kept: new()?,
-        colors: Spool::new(&plan.place()).map_err(BuildError::Scratch)?,
+        kept: Spool::named(&plan.place(), "kept").map_err(BuildError::Scratch)?,
+        colors: Spool::named(&plan.place(), "kept_colors").map_err(BuildError::Scratch)?,
         sizes: vec![],
         top: vec![],
     };

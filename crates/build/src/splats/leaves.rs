@@ -217,7 +217,7 @@ fn collect(
     let Mesh { positions, normals, colors, triangles } = mesh;
     drop((normals, triangles));
     let has_colors = colors.len() > 0;
-    let mut leaves = Spool::new(&plan.place())?;
+    let mut leaves = Spool::named(&plan.place(), "leaves")?;
     leaves.expect(positions.len());
     let (mut at, mut aspect, mut color) = (Vec::new(), Vec::new(), Vec::new());
     gathered.for_each_piece(MemoryPlan::PIECE, |start, gathered| {

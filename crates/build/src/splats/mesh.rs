@@ -21,10 +21,10 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
     phases.begin("read", input.bytes_consumed().1);
     let place = plan.place();
     let mut mesh = Mesh {
-        positions: Spool::new(&place).map_err(BuildError::Scratch)?,
-        normals: Spool::new(&place).map_err(BuildError::Scratch)?,
-        colors: Spool::new(&place).map_err(BuildError::Scratch)?,
-        triangles: Spool::new(&place).map_err(BuildError::Scratch)?,
+        positions: Spool::named(&place, "positions").map_err(BuildError::Scratch)?,
+        normals: Spool::named(&place, "normals").map_err(BuildError::Scratch)?,
+        colors: Spool::named(&place, "colors").map_err(BuildError::Scratch)?,
+        triangles: Spool::named(&place, "triangles").map_err(BuildError::Scratch)?,
     };
     if let (Some(vertices), Some(faces)) = (input.declared_vertices(), input.declared_faces()) {
         // A header's word, believed only as far as the plan found room for it.

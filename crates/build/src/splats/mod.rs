@@ -8,13 +8,15 @@
 //!          a vertex   65,536     midpoint  a node          top-down     families
 //! ```
 //!
-//! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk.
+//! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk. On
+//! disk, `checkpoint.rs` makes of the end of each step a place to continue from.
 //!
 //! What always holds: each decoded sphere encloses the true sphere of its node, and with it all true leaves below; each
 //! node's cone holds the cones of its children as decoded, and a leaf's cone the normals of all triangles at its vertex.
 //! The tree depends on the set of vertices alone, not on their order, and
 //! the bytes of the file on nothing else but the sums of normals, which are taken in the order of the triangles.
 
+mod checkpoint;
 mod chunk;
 mod contract;
 mod divide;
@@ -28,48 +30,93 @@ mod plan;
 mod quantise;
 mod tree;
 
-use crate::output::Output;
+use crate::journal::Header;
+use crate::output::{Output, expect_no_folder, folder_of};
 use crate::progress::{Phases, Progress, Report};
+use crate::spool::Place;
+use crate::work::Work;
 use crate::{BuildError, Options};
+use checkpoint::{Facts, Stage};
 use gigalod_format::splats::{Root, Skeleton};
 use gigalod_format::{Bounds, InputCounts, Kind, Metadata};
 use gigalod_import::ModelStream;
+use plan::MemoryPlan;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// In files and in journals.
+const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"));
 
 /// Builds `out` from a mesh.
 ///
 /// # Errors
 /// Whatever is wrong with the input, the budget or the output; `out` is then as it was before.
 pub fn build(
-    mut input: Box<dyn ModelStream>,
+    input: Box<dyn ModelStream>,
     options: &Options,
     progress: &dyn Progress,
     out: &Path,
 ) -> Result<Report, BuildError> {
-    let output = Output::create(out).map_err(BuildError::Output)?;
+    expect_no_folder(out).map_err(BuildError::Output)?;
     let phases = Phases::new(progress);
     let workers = rayon::ThreadPoolBuilder::new()
         .num_threads(options.threads)
         .build()
         .map_err(|error| BuildError::Threads(error.to_string()))?;
 
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let plan = plan::MemoryPlan::new(options, &*input, folder);
-
-    let mesh = mesh::read(&mut *input, &plan, &phases)?;
     let up = options.up.unwrap_or(input.up_axis());
-    let counts = InputCounts { triangles: mesh.triangles.len(), vertices: mesh.positions.len(), points: 0 };
-    drop(input);
+    let influential =
+        BTreeMap::from([("as".into(), Kind::Splats.name().into()), ("up".into(), format!("{up:?}").to_lowercase())]);
+    let in_memory = plan::fits_into_memory(options, &*input);
+    let work = match &options.input {
+        Some(identity) => {
+            let program = GENERATOR.into();
+            let header = Header { program, input: identity.clone(), options: influential.clone() };
+            Work::open(out, header, options.resume, !in_memory, |text| progress.note(text))?
+        }
+        None => None,
+    };
+    let (output, place) = match &work {
+        Some(work) => (Output::create_in(work, out), Place::Work(work)),
+        None if in_memory => (Output::create(out), Place::Memory),
+        None => (Output::create(out), Place::Folder(folder_of(out))),
+    };
+    let output = output.map_err(BuildError::Output)?;
+    let plan = MemoryPlan::new(options, place);
 
-    let leaves = workers.install(|| leaves::from_mesh(mesh, &plan, &phases))?;
-    let leaves::Leaves { leaves, origin, bounds, closed, has_colors } = leaves;
-    let (quantised, colors) = workers.install(|| {
-        let mut chunks = divide::divide(leaves, has_colors, &plan, &phases)?;
-        let top = std::mem::take(&mut chunks.top);
-        let quantised = quantise::top_down(&chunks, top, &plan, &phases).map_err(BuildError::Scratch)?;
-        Ok::<_, BuildError>((quantised, chunks.colors))
-    })?;
+    let mut input = Some(input);
+    let (mut stage, resumed_after) = checkpoint::load(work.as_ref()).map_err(BuildError::Scratch)?;
+    let (facts, quantised, colors) = loop {
+        stage = match stage {
+            Stage::Start => {
+                let mut input = input.take().expect("a build starts once");
+                Stage::Read(mesh::read(&mut *input, &plan, &phases)?)
+            }
+            Stage::Read(mesh) => {
+                let counts = InputCounts { triangles: mesh.triangles.len(), vertices: mesh.positions.len(), points: 0 };
+                let leaves = workers.install(|| leaves::from_mesh(mesh, &plan, &phases))?;
+                let leaves::Leaves { leaves, origin, bounds, closed, has_colors } = leaves;
+                Stage::Leaves(Facts { counts, origin, bounds, closed, has_colors }, leaves)
+            }
+            Stage::Leaves(facts, leaves) => {
+                let chunks = workers.install(|| divide::divide(leaves, facts.has_colors, &plan, &phases))?;
+                Stage::Tree(facts, chunks)
+            }
+            Stage::Tree(facts, mut chunks) => {
+                let top = std::mem::take(&mut chunks.top);
+                let quantised = workers
+                    .install(|| quantise::top_down(&chunks, top, &plan, &phases))
+                    .map_err(BuildError::Scratch)?;
+                Stage::Quantised(facts, quantised, chunks.colors)
+            }
+            Stage::Quantised(facts, quantised, colors) => break (facts, quantised, colors),
+        };
+        if let Some(work) = &work {
+            checkpoint::save(work, &stage).map_err(BuildError::Scratch)?;
+        }
+    };
+    drop(input);
+    let Facts { counts, origin, bounds, closed, has_colors } = facts;
     let layout::Written { writer, pages, model, nodes, leaves, levels, raw_bytes } =
         workers.install(|| layout::write(&quantised, &colors, output.file(), &phases)).map_err(BuildError::Output)?;
     let root = Root {
@@ -90,12 +137,9 @@ pub fn build(
     }
     let skeleton = Skeleton::encode(&root, &pages, model.as_ref());
     let metadata = Metadata {
-        generator: concat!("gigalod ", env!("CARGO_PKG_VERSION")).into(),
+        generator: GENERATOR.into(),
         input: counts,
-        options: BTreeMap::from([
-            ("as".into(), Kind::Splats.name().into()),
-            ("up".into(), format!("{up:?}").to_lowercase()),
-        ]),
+        options: influential,
         nodes: root.nodes,
         levels: root.levels,
         leaves: root.leaves,
@@ -108,5 +152,9 @@ pub fn build(
     let (buffer, output_bytes) = writer.finish(&skeleton, &metadata).map_err(BuildError::Output)?;
     drop(buffer);
     output.publish().map_err(BuildError::Output)?;
-    Ok(Report { metadata, output_bytes, phases: phases.times() })
+    drop((quantised, colors));
+    if let Some(work) = work {
+        work.done();
+    }
+    Ok(Report { metadata, output_bytes, phases: phases.times(), resumed_after })
 }

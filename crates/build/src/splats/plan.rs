@@ -7,7 +7,6 @@ use super::chunk::MAX_LEAVES;
 use crate::Options;
 use crate::spool::Place;
 use gigalod_import::ModelStream;
-use std::path::Path;
 
 /// What the spools take for each vertex and triangle, at the stage where they take most: position, normal, colour and gathered
 /// attributes; then leaf, kept nodes and packed nodes.
@@ -24,29 +23,32 @@ const WORK_PER_LEAF: u64 = 160;
 #[derive(Debug)]
 pub(super) struct MemoryPlan<'a> {
     budget: u64,
-    in_memory: bool,
-    folder: &'a Path,
+    place: Place<'a>,
+}
+
+/// Decides by what the stream declares; a stream that declares nothing is spooled to files.
+pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bool {
+    let spooled = match (input.declared_vertices(), input.declared_faces()) {
+        (Some(vertices), Some(faces)) => {
+            vertices.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE))
+        }
+        _ => u64::MAX,
+    };
+    spooled <= options.memory_bytes / 2
 }
 
 impl<'a> MemoryPlan<'a> {
-    /// Decides by what the stream declares; a stream that declares nothing is spooled to files in `folder`.
-    pub(super) fn new(options: &Options, input: &dyn ModelStream, folder: &'a Path) -> Self {
-        let spooled = match (input.declared_vertices(), input.declared_faces()) {
-            (Some(vertices), Some(faces)) => {
-                vertices.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE))
-            }
-            _ => u64::MAX,
-        };
-        Self { budget: options.memory_bytes, in_memory: spooled <= options.memory_bytes / 2, folder }
+    pub(super) fn new(options: &Options, place: Place<'a>) -> Self {
+        Self { budget: options.memory_bytes, place }
     }
 
     pub(super) fn place(&self) -> Place<'a> {
-        if self.in_memory { Place::Memory } else { Place::Folder(self.folder) }
+        self.place
     }
 
     /// True where all spools are in memory.
     pub(super) fn is_in_memory(&self) -> bool {
-        self.in_memory
+        matches!(self.place, Place::Memory)
     }
 
     /// Vertices that memory has room for.

@@ -50,7 +50,7 @@ pub(super) fn top_down(
 
     let roots: Vec<&Binary> = top.iter().filter(|node| node.units == 1).collect();
     let mut starts = Vec::with_capacity(chunks.sizes.len());
-    let mut nodes = Spool::new(&plan.place())?;
+    let mut nodes = Spool::named(&plan.place(), "nodes")?;
     nodes.expect(chunks.kept.len());
     let (mut levels, mut overhang) = (Vec::with_capacity(roots.len()), 1.0_f64);
     let mut reach = vec![0.0; top.len()];

@@ -51,6 +51,12 @@ pub(crate) struct BuildArgs {
     /// Which way is up [default: as the format has it]
     #[arg(long, value_enum)]
     pub(crate) up: Option<UpAxisArg>,
+    /// Continue a build that was interrupted, if there is one
+    ///
+    /// A build that does not fit into half of --memory works in a folder beside the output, .NAME.glod.build, and can go on
+    /// there after anything: with the same input, --as and --up; --memory and --threads may differ. Others start anew.
+    #[arg(long)]
+    pub(crate) resume: bool,
     #[command(flatten)]
     pub(crate) options: BuildOptions,
 }

@@ -6,7 +6,7 @@ use super::files;
 use super::parse::readable_bytes;
 use super::progress::Console;
 use super::usage::Usage;
-use gigalod_build::{Options, Report};
+use gigalod_build::{BuildError, Options, Report};
 use gigalod_format::InputCounts;
 use gigalod_geom::camera::UpAxis;
 use serde::Serialize;
@@ -30,6 +30,7 @@ struct BuildReport<'a> {
     cpu_seconds: f64,
     peak_memory_bytes: u64,
     phases: Vec<PhaseReport>,
+    resumed_after: Option<&'a str>,
 }
 
 #[derive(Serialize)]
@@ -45,7 +46,8 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
     };
     files::check_output(&args.output, &[input])?;
     let usage = Usage::watch();
-    let report = build(input, &args.output, &args.options, args.up.map(UpAxis::from), console)?;
+    let recovery = if args.resume { Recovery::Resume } else { Recovery::Keep };
+    let report = build(input, &args.output, &args.options, args.up.map(UpAxis::from), recovery, console)?;
     let (seconds, cpu_seconds) = usage.seconds();
     let metadata = &report.metadata;
     if metadata.leaves < FEW_VERTICES {
@@ -67,6 +69,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         cpu_seconds,
         peak_memory_bytes: usage.peak_memory_bytes(),
         phases: report.phases.iter().map(|phase| PhaseReport { name: phase.name, seconds: phase.seconds }).collect(),
+        resumed_after: report.resumed_after.as_deref(),
     };
     let text = format!(
         "{}: {} triangles as {} splats on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
@@ -89,17 +92,42 @@ impl From<UpAxisArg> for UpAxis {
     }
 }
 
+/// What becomes of a build that is interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Recovery {
+    /// It is lost.
+    Lost,
+    /// If it does not fit into memory, it stays, to be continued.
+    Keep,
+    /// And what an earlier one has left is continued now.
+    Resume,
+}
+
+/// Said where there is something to continue.
+pub(crate) const CONTINUE: &str = "continue with --resume";
+
 /// Builds one model into one file, with progress.
 pub(crate) fn build(
     input: &Path,
     output: &Path,
     options: &BuildOptions,
     up: Option<UpAxis>,
+    recovery: Recovery,
     console: &Console,
 ) -> Result<Report, CliError> {
-    let stream = files::open_model(input)?;
-    let options = Options { memory_bytes: options.memory, threads: options.threads, up };
+    let (stream, identity) = files::open_input(input)?;
+    let options = Options {
+        memory_bytes: options.memory,
+        threads: options.threads,
+        up,
+        input: (recovery != Recovery::Lost).then_some(identity),
+        resume: recovery == Recovery::Resume,
+    };
     let work = console.work(&input.file_name().unwrap_or_default().to_string_lossy());
-    gigalod_build::splats::build(stream, &options, &work, output)
-        .map_err(|error| CliError::build(input, output, &error))
+    gigalod_build::splats::build(stream, &options, &work, output).map_err(|error| {
+        let is_ours = !matches!(error, BuildError::Busy { .. } | BuildError::OtherBuild { .. });
+        let error = CliError::build(input, output, &error);
+        let stays = is_ours && recovery != Recovery::Lost && gigalod_build::can_continue(output);
+        if stays { error.hint(CONTINUE) } else { error }
+    })
 }

@@ -1,7 +1,7 @@
 //! Raw models built on the way to a picture are kept in the user's cache, keyed by their contents and the build options.
 
 use super::args::BuildOptions;
-use super::build::build;
+use super::build::{Recovery, build};
 use super::error::CliError;
 use super::files;
 use super::progress::Console;
@@ -22,7 +22,7 @@ pub(crate) fn container_of(file: &Path, options: &BuildOptions, console: &Consol
         return Ok(cached);
     }
     std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
-    build(file, &cached, options, None, console)?;
+    build(file, &cached, options, None, Recovery::Lost, console)?;
     console.detail(|| format!("{}: built as {}", file.display(), cached.display()));
     Ok(cached)
 }

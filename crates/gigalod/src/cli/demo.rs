@@ -1,7 +1,7 @@
 //! `gigalod demo`: from nothing to four pictures.
 
 use super::args::{BuildOptions, DemoArgs};
-use super::build::build;
+use super::build::{Recovery, build};
 use super::error::{CliError, Outcome};
 use super::parse::readable_bytes;
 use super::progress::Console;
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliErro
 
     let built = folder.join("statue.glod");
     let build_options = BuildOptions { memory: 2 << 30, threads: 0 };
-    let report = build(&scan, &built, &build_options, None, console)?;
+    let report = build(&scan, &built, &build_options, None, Recovery::Lost, console)?;
     let _ = writeln!(text, "{}: {}", built.display(), readable_bytes(report.output_bytes));
 
     let mut stage = Stage::open(&built, 1 << 30)?;

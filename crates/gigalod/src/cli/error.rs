@@ -25,13 +25,13 @@ impl Outcome {
     }
 }
 
-/// One thing that is wrong: `error: FILE: what is wrong (where)`, and perhaps a hint.
+/// One thing that is wrong: `error: FILE: what is wrong (where)`, and perhaps hints, a line each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CliError {
     file: Option<String>,
     what: String,
     place: Option<String>,
-    hint: Option<String>,
+    hints: Vec<String>,
     pub(crate) is_usage: bool,
 }
 
@@ -60,7 +60,7 @@ impl CliError {
     }
 
     pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = Some(hint.into());
+        self.hints.push(hint.into());
         self
     }
 
@@ -76,6 +76,7 @@ impl CliError {
         match error {
             BuildError::Import(error) => Self::import(input, error),
             BuildError::Output(error) => Self::write(output, error),
+            BuildError::Busy { .. } | BuildError::OtherBuild { .. } => Self::in_file(output, error),
             BuildError::Crowd { .. } => Self::in_file(input, error).hint("give a larger --memory, as --memory 8GiB"),
             BuildError::Scratch(_) => Self::in_file(output, error)
                 .hint("temporary files lie in the folder of the output, and may be larger than the input"),
@@ -109,10 +110,7 @@ impl fmt::Display for CliError {
         if let Some(place) = &self.place {
             write!(f, " ({place})")?;
         }
-        if let Some(hint) = &self.hint {
-            write!(f, "\nhint: {hint}")?;
-        }
-        Ok(())
+        self.hints.iter().try_for_each(|hint| write!(f, "\nhint: {hint}"))
     }
 }
 

@@ -1,9 +1,10 @@
 //! Opening and writing files.
 
 use super::error::CliError;
+use gigalod_build::InputIdentity;
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, FileStore};
-use gigalod_import::{ByteSource, ModelStream};
+use gigalod_import::{ByteSource, ModelStream, Stamp};
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -11,8 +12,22 @@ use std::sync::Arc;
 
 /// Opens a raw model.
 pub(crate) fn open_model(path: &Path) -> Result<Box<dyn ModelStream>, CliError> {
+    Ok(open_input(path)?.0)
+}
+
+/// Opens a raw model, and says which it is.
+pub(crate) fn open_input(path: &Path) -> Result<(Box<dyn ModelStream>, InputIdentity), CliError> {
+    let wrong = |error: io::Error| CliError::in_file(path, error);
     let file = open(path)?;
-    gigalod_import::open(Box::new(file) as Box<dyn ByteSource>).map_err(|error| CliError::import(path, &error))
+    let identity = InputIdentity::of(path, &file).map_err(wrong)?;
+    let watched = file.try_clone().map_err(wrong)?;
+    let ask = move || {
+        let metadata = watched.metadata()?;
+        Ok(Stamp { bytes: metadata.len(), modified: metadata.modified()? })
+    };
+    let stream = gigalod_import::open_watched(Box::new(file) as Box<dyn ByteSource>, Box::new(ask))
+        .map_err(|error| CliError::import(path, &error))?;
+    Ok((stream, identity))
 }
 
 /// Opens a `.glod` file.

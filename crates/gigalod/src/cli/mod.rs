@@ -43,8 +43,12 @@ pub(crate) fn run() -> ExitCode {
     };
     // Where there are no signals to handle, files of an interrupted run stay behind; that is no reason not to run.
     let _ = ctrlc::set_handler(|| {
-        gigalod_build::Output::remove_unfinished();
-        eprintln!("interrupted");
+        let kept = gigalod_build::abandon();
+        // Where nobody can be told, it ends all the same.
+        let _ = writeln!(io::stderr(), "interrupted");
+        if !kept.is_empty() {
+            let _ = writeln!(io::stderr(), "hint: {}", build::CONTINUE);
+        }
         std::process::exit(130);
     });
     let console = progress::Console::new(cli.verbose);

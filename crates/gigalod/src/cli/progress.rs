@@ -76,6 +76,10 @@ impl Drop for Work<'_> {
 }
 
 impl Progress for Work<'_> {
+    fn note(&self, text: &str) {
+        self.console.line(format_args!("note: {text}"));
+    }
+
     fn begin(&self, phase: &'static str, total: u64) {
         self.finish();
         let bar = if !self.console.on_terminal {

@@ -71,10 +71,7 @@ impl Ran {
         let place = error["where"].as_str().map(|place| format!(" ({place})")).unwrap_or_default();
         let mut lines = self.stderr.lines();
         assert_eq!(lines.next(), Some(&*format!("error: {}: {what}{place}", file.display())));
-        if let Some(hint) = lines.next() {
-            assert!(hint.starts_with("hint: "), "{self:?}");
-        }
-        assert_eq!(lines.next(), None, "{self:?}");
+        assert!(lines.all(|hint| hint.starts_with("hint: ")), "{self:?}");
         what.to_string()
     }
 }
@@ -210,4 +207,26 @@ pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })
     })
+}
+
+/// A text PLY of strips over a wavy grid: as nobody declares how many triangles they are, it is always built out of core.
+pub(crate) fn strips(side: usize) -> String {
+    use std::fmt::Write;
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element tristrips {}\nproperty list int int vertex_indices\nend_header\n",
+        side * side,
+        side - 1
+    );
+    for (row, column) in (0..side).flat_map(|row| (0..side).map(move |column| (row, column))) {
+        writeln!(text, "{column} {row} {}", (row * row + 3 * column) % 7).unwrap();
+    }
+    for row in 0..side - 1 {
+        write!(text, "{}", 2 * side).unwrap();
+        for column in 0..side {
+            write!(text, " {} {}", row * side + column, (row + 1) * side + column).unwrap();
+        }
+        text.push('\n');
+    }
+    text
 }

@@ -1,0 +1,61 @@
+//! Which file a build is of, as far as it can be told without reading all of it.
+
+use gigalod_format::checksum;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+
+/// Tells one input from another, and from itself after a change.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputIdentity {
+    /// Where it lies, from the root.
+    pub path: String,
+    /// Its length.
+    pub bytes: u64,
+    /// When it was last written to: seconds and nanoseconds since 1970.
+    pub modified: (u64, u32),
+    /// Checksums of its first and last 64 KiB.
+    pub ends: [u32; 2],
+}
+
+/// Bytes of an end.
+const END_BYTES: u64 = 64 << 10;
+
+impl InputIdentity {
+    /// Of a file as it is now, which lies at `path`. Afterwards it stands anywhere.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn of(path: &Path, mut file: &File) -> io::Result<Self> {
+        let metadata = file.metadata()?;
+        let since = metadata.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default();
+        let mut end = |start: u64| -> io::Result<u32> {
+            file.seek(SeekFrom::Start(start))?;
+            let mut bytes = Vec::new();
+            file.by_ref().take(END_BYTES).read_to_end(&mut bytes)?;
+            Ok(checksum(&bytes))
+        };
+        let ends = [end(0)?, end(metadata.len().saturating_sub(END_BYTES))?];
+        Ok(Self {
+            path: path.canonicalize()?.to_string_lossy().into_owned(),
+            bytes: metadata.len(),
+            modified: (since.as_secs(), since.subsec_nanos()),
+            ends,
+        })
+    }
+
+    /// The first thing by which two inputs differ, of this one and of the other.
+    pub(crate) fn difference(&self, other: &Self) -> Option<(String, String)> {
+        let facts = |input: &Self| {
+            [
+                input.path.clone(),
+                format!("{} bytes", input.bytes),
+                format!("checksums {:08x} and {:08x} of its ends", input.ends[0], input.ends[1]),
+                format!("modified {}.{:09} s after 1970", input.modified.0, input.modified.1),
+            ]
+        };
+        facts(self).into_iter().zip(facts(other)).find(|(own, others)| own != others)
+    }
+}

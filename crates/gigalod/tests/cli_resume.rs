@@ -1,0 +1,309 @@
+//! Builds that are interrupted, and go on.
+#![cfg(unix)]
+
+mod cli_support;
+
+use cli_support::{Ran, command, folder, names_in, strips};
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant, SystemTime};
+
+/// A statue that does not fit into the smallest memory, and what it builds into.
+struct Big {
+    ply: PathBuf,
+    glod: Vec<u8>,
+    /// How long it took to build, for moments spread over it.
+    took: Duration,
+}
+
+fn big() -> &'static Big {
+    static BIG: OnceLock<Big> = OnceLock::new();
+    BIG.get_or_init(|| {
+        let (ply, out) = (folder().join("big.ply"), folder().join("big.glod"));
+        run!["synth", "statue", "--triangles", "900k", "--colors", "-o", ply].done();
+        let begun = Instant::now();
+        run!["build", ply, "-o", out, "--memory", "64MiB"].done();
+        let took = begun.elapsed();
+        let glod = std::fs::read(&out).unwrap();
+        run!["build", ply, "-o", out].done();
+        assert!(std::fs::read(&out).unwrap() == glod, "in memory as out of it");
+        Big { ply, glod, took }
+    })
+}
+
+/// An output in a folder of its own.
+struct Place {
+    folder: tempfile::TempDir,
+    out: PathBuf,
+    work: PathBuf,
+}
+
+impl Place {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let (out, work) = (folder.path().join("a.glod"), folder.path().join(".a.glod.build"));
+        Self { folder, out, work }
+    }
+
+    fn spawn(&self, input: &Path, options: &[&str]) -> Child {
+        let mut command = command();
+        command.arg("build").arg(input).arg("-o").arg(&self.out).args(["--memory", "64MiB"]).args(options);
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    fn resume(&self, input: &Path) -> Ran {
+        run!["build", input, "-o", self.out, "--memory", "64MiB", "--resume", "--json"]
+    }
+
+    /// The phase that the journal says is finished.
+    fn journaled(&self) -> Option<String> {
+        let text = std::fs::read_to_string(self.work.join("journal")).ok()?;
+        let body: Value = serde_json::from_str(text.lines().nth(1)?).ok()?;
+        Some(body["phase"].as_str()?.to_string())
+    }
+
+    /// Waits until so many phases are finished, and ends the process as nobody can prevent.
+    fn kill_after(&self, child: &mut Child, phases: usize) -> Option<String> {
+        let order = ["read", "leaves", "tree", "quantise"];
+        let has_come = |phase: &String| order.iter().position(|name| name == phase).unwrap() + 1 >= phases;
+        while child.try_wait().unwrap().is_none() && !self.journaled().as_ref().is_some_and(has_come) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        self.journaled()
+    }
+
+    #[track_caller]
+    fn expect_done(&self, bytes: &[u8]) {
+        assert!(std::fs::read(&self.out).unwrap() == bytes, "the bytes of a build that nobody interrupted");
+        assert_eq!(names_in(self.folder.path()), ["a.glod"], "nothing else");
+    }
+}
+
+#[test]
+fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
+    let (big, place) = (big(), Place::new());
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    let mut random = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut kills = 0;
+    while kills < 10 {
+        let mut child = place.spawn(&big.ply, &["--resume"]);
+        // Of a run that goes on less is left than of one that begins.
+        std::thread::sleep(big.took.mul_f64(random() * if place.work.exists() { 0.5 } else { 1.0 }));
+        child.kill().unwrap();
+        if child.wait().unwrap().success() {
+            // It was done before its time: once more from the beginning.
+            place.expect_done(&big.glod);
+            std::fs::remove_file(&place.out).unwrap();
+        } else {
+            kills += 1;
+            println!("killed after {:?}", place.journaled());
+            let names = names_in(place.folder.path());
+            // Of a build that had its name a moment ago, but had not put its work away yet.
+            if place.out.exists() {
+                assert!(std::fs::read(&place.out).unwrap() == big.glod);
+                std::fs::remove_file(&place.out).unwrap();
+            } else {
+                assert!(names.iter().all(|name| name == ".a.glod.build"), "{names:?}");
+            }
+        }
+    }
+    let ran = place.resume(&big.ply).done();
+    place.expect_done(&big.glod);
+    assert!(ran.stderr.lines().all(|line| line.starts_with("note: ")), "{ran:?}");
+}
+
+#[test]
+fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now() {
+    let big = big();
+    let others = [["--memory", "64MiB"], ["--memory", "4GiB"], ["--threads", "1"], ["--memory", "100MiB"]];
+    for (phases, options) in (1..).zip(others) {
+        let place = Place::new();
+        // Where the machine is so busy that the build was over before it could be killed: once more.
+        let phase = std::iter::repeat_with(|| {
+            let mut child = place.spawn(&big.ply, &["--threads", "2"]);
+            place.kill_after(&mut child, phases)
+        });
+        let phase = phase.flatten().next().unwrap();
+        let ran = run!["build", big.ply, "-o", place.out, "--resume", "--json", options[0], options[1]].done();
+        assert_eq!(ran.stderr, "", "nothing to note");
+        assert_eq!(ran.json()["resumed_after"], *phase);
+        let names: Vec<_> =
+            ran.json()["phases"].as_array().unwrap().iter().map(|phase| phase["name"].clone()).collect();
+        assert!(!names.contains(&Value::from("read")) && !names.contains(&Value::from(phase)), "{names:?}");
+        assert_eq!(names.last().unwrap(), "write");
+        place.expect_done(&big.glod);
+    }
+}
+
+/// Runs a build that fails for want of room as soon as a file has more than so many bytes.
+fn build_within(file_bytes: u64, arguments: &[&OsStr]) -> Ran {
+    let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", file_bytes / 512);
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg(script).arg(env!("CARGO_BIN_EXE_gigalod")).args(arguments).stdin(Stdio::null());
+    Ran::of(shell.output().unwrap())
+}
+
+/// A small model and its build, interrupted after the leaves.
+fn interrupted() -> (Place, PathBuf, Vec<u8>) {
+    let place = Place::new();
+    let ply = place.folder.path().join("strips.ply");
+    // Positions and triangles take 24 bytes a vertex, kept nodes more.
+    const SIDE: u64 = 130;
+    std::fs::write(&ply, strips(SIDE as usize)).unwrap();
+    run!["build", ply, "-o", place.out].done();
+    let bytes = std::fs::read(&place.out).unwrap();
+    std::fs::remove_file(&place.out).unwrap();
+    let arguments = [OsStr::new("build"), ply.as_ref(), "-o".as_ref(), place.out.as_ref(), "--json".as_ref()];
+    let ran = build_within(SIDE * SIDE * 25, &arguments);
+    assert!(ran.failed(&place.out).contains("temporary files"), "{ran:?}");
+    assert!(ran.stderr.ends_with("\nhint: continue with --resume\n"), "{ran:?}");
+    assert_eq!(place.journaled().as_deref(), Some("leaves"));
+    assert_eq!(names_in(place.folder.path()), [".a.glod.build", "strips.ply"]);
+    (place, ply, bytes)
+}
+
+#[test]
+fn another_input_and_other_options_are_refused_and_nothing_is_lost() {
+    let (place, ply, bytes) = interrupted();
+    let refused = |ran: Ran, what: &str| {
+        let said = ran.failed(&place.out);
+        assert!(said.starts_with(&format!("the build in {} was {what}: expected ", place.work.display())), "{said}");
+        assert!(said.ends_with("; remove the folder or run without --resume"), "{said}");
+        assert_eq!(ran.stderr.lines().count(), 1, "no hint: {ran:?}");
+        assert_eq!(place.journaled().as_deref(), Some("leaves"));
+        said
+    };
+    let said = refused(run!["build", ply, "-o", place.out, "--resume", "--json", "--up", "z"], "with other options");
+    assert!(said.contains("expected --as splats --up y, found --as splats --up z;"), "{said}");
+
+    let other = place.folder.path().join("other.ply");
+    std::fs::copy(&ply, &other).unwrap();
+    let said = refused(place.resume(&other), "of another input");
+    assert!(said.contains("strips.ply, found ") && said.contains("other.ply;"), "{said}");
+    std::fs::remove_file(other).unwrap();
+
+    // Another time, another length, other bytes; then all as it was.
+    let file = File::options().read(true).write(true).open(&ply).unwrap();
+    let (written, length) = (file.metadata().unwrap().modified().unwrap(), file.metadata().unwrap().len());
+    file.set_modified(SystemTime::UNIX_EPOCH + Duration::from_secs(1)).unwrap();
+    let said = refused(place.resume(&ply), "of another input");
+    assert!(said.contains(", found modified 1.000000000 s after 1970;"), "{said}");
+    file.set_len(length + 1).unwrap();
+    file.set_modified(written).unwrap();
+    let said = refused(place.resume(&ply), "of another input");
+    assert!(said.contains(&format!("expected {length} bytes, found {} bytes;", length + 1)), "{said}");
+    file.set_len(length).unwrap();
+    let mut last = [0];
+    file.read_exact_at(&mut last, length - 2).unwrap();
+    file.write_all_at(b" ", length - 2).unwrap();
+    file.set_modified(written).unwrap();
+    let said = refused(place.resume(&ply), "of another input");
+    assert!(said.contains("of its ends, found checksums"), "{said}");
+    file.write_all_at(&last, length - 2).unwrap();
+    file.set_modified(written).unwrap();
+
+    assert_eq!(place.resume(&ply).done().json()["resumed_after"], "leaves");
+    std::fs::remove_file(ply).unwrap();
+    place.expect_done(&bytes);
+}
+
+#[test]
+fn a_damaged_journal_begins_anew_and_says_so() {
+    let (place, ply, bytes) = interrupted();
+    let journal = place.work.join("journal");
+    let mut damaged = std::fs::read(&journal).unwrap();
+    let spools = |name: &str| place.work.join(name).with_extension("spool");
+    let starts_anew = |why: &str, is_there: bool| {
+        let ran = place.resume(&ply).done();
+        assert_eq!(ran.stderr, format!("note: {}: {why}, starting from the beginning\n", place.work.display()));
+        assert!(ran.json()["resumed_after"].is_null());
+        assert!(std::fs::read(&place.out).unwrap() == bytes && !place.work.exists());
+        std::fs::remove_file(&place.out).unwrap();
+        assert!(is_there || !journal.exists());
+    };
+    assert!(spools("leaves").is_file() && !spools("positions").exists(), "what nobody needs is gone");
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    std::fs::write(&journal, &damaged).unwrap();
+    starts_anew("its journal is damaged", true);
+    // As a crash in the first phase leaves it; a crash just before the end; and none.
+    std::fs::create_dir(&place.work).unwrap();
+    std::fs::write(spools("positions"), "half").unwrap();
+    starts_anew("no phase was finished", false);
+    starts_anew("nothing to continue", false);
+
+    let (place, ply, bytes) = interrupted();
+    File::options().write(true).open(place.work.join("leaves.spool")).unwrap().set_len(100).unwrap();
+    let ran = place.resume(&ply).done();
+    assert!(ran.stderr.contains(": files are missing, starting from the beginning\n"), "{ran:?}");
+    assert!(std::fs::read(&place.out).unwrap() == bytes);
+}
+
+#[test]
+fn without_resume_an_old_folder_is_removed() {
+    // Out of memory, and in it.
+    for memory in ["64MiB", "2GiB"] {
+        let (place, ply, bytes) = interrupted();
+        let small = if memory == "2GiB" { cli_support::statue().ply.clone() } else { ply };
+        let ran = run!["build", small, "-o", place.out, "--memory", memory, "--json"].done();
+        assert!(ran.json()["resumed_after"].is_null() && ran.stderr.is_empty(), "{ran:?}");
+        assert_eq!(names_in(place.folder.path()), ["a.glod", "strips.ply"]);
+        assert!(memory == "2GiB" || std::fs::read(&place.out).unwrap() == bytes);
+    }
+}
+
+#[test]
+fn only_one_process_builds_an_output_at_a_time() {
+    let (place, ply, bytes) = interrupted();
+    let lock = File::options().write(true).open(place.work.join("lock")).unwrap();
+    lock.lock().unwrap();
+    for resume in [&["--resume"][..], &[]] {
+        let arguments = ["build", ply.to_str().unwrap(), "-o", place.out.to_str().unwrap(), "--json"];
+        let ran = cli_support::gigalod(arguments.iter().chain(resume));
+        let expected = format!("another build is working in {}", place.work.display());
+        assert_eq!((ran.failed(&place.out), ran.stderr.lines().count()), (expected, 1));
+        assert_eq!(place.journaled().as_deref(), Some("leaves"), "unharmed");
+    }
+    drop(lock);
+    place.resume(&ply).done();
+    assert!(std::fs::read(&place.out).unwrap() == bytes);
+}
+
+/// What Ctrl-C does, and `kill`.
+#[test]
+fn an_interrupted_build_says_that_it_can_go_on_if_it_can() {
+    let big = big();
+    for phases in [0, 1, 2] {
+        let place = Place::new();
+        let mut build = command();
+        build.arg("build").arg(&big.ply).arg("-o").arg(&place.out).args(["--memory", "64MiB"]);
+        let child = build.stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        while !place.work.join("pages.part").exists() || phases > 0 && place.journaled().is_none() {
+            std::thread::yield_now();
+        }
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(killed.success());
+        let ran = Ran::of(child.wait_with_output().unwrap());
+        let stays = place.journaled().is_some();
+        let hint = if stays { "hint: continue with --resume\n" } else { "" };
+        assert_eq!((ran.status, ran.stderr), (130, format!("interrupted\n{hint}")));
+        assert!(stays || phases == 0);
+        assert_eq!(names_in(place.folder.path()), if stays { &[".a.glod.build"][..] } else { &[] });
+        if stays {
+            assert!(place.resume(&big.ply).done().json()["resumed_after"].is_string());
+            place.expect_done(&big.glod);
+        }
+    }
+}

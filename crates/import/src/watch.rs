@@ -1,0 +1,202 @@
+//! A file that changes while it is read would become a model that never was.
+//!
+//! In: a stream, and a way to ask for its source's [`Stamp`]. Out: the same stream, whose end, or first error, is an error
+//! of its own if the stamp is no longer what it was when the source was opened: a file that got shorter is not blamed for it.
+
+use crate::{Attributes, Batch, ByteSource, ImportError, ModelStream, error::Problem, open};
+use gigalod_geom::camera::UpAxis;
+use std::{fmt, io, time::SystemTime};
+
+/// What changes with a file's contents, and can be told without reading it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// Its length.
+    pub bytes: u64,
+    /// When it was last written to.
+    pub modified: SystemTime,
+}
+
+/// Asks for the stamp as it is now.
+pub type AskStamp = Box<dyn FnMut() -> io::Result<Stamp> + Send>;
+
+/// As [`open`], for a source that others might write to.
+///
+/// # Errors
+/// As there; and from the stream, that the source has changed.
+pub fn open_watched(source: Box<dyn ByteSource>, mut ask: AskStamp) -> Result<Box<dyn ModelStream>, ImportError> {
+    let opened = ask().map_err(|source| ImportError::new(Problem::Io { source }, None))?;
+    let mut watch = Watch { opened, ask };
+    let stream = open(source).map_err(|error| watch.explain(error))?;
+    Ok(Box::new(Watched { stream, watch }))
+}
+
+struct Watch {
+    opened: Stamp,
+    ask: AskStamp,
+}
+
+impl Watch {
+    fn check(&mut self) -> Result<(), ImportError> {
+        let now = (self.ask)().map_err(|source| ImportError::new(Problem::Io { source }, None))?;
+        if now == self.opened {
+            return Ok(());
+        }
+        Err(ImportError::new(Problem::Changed { expected: self.opened, found: now }, None))
+    }
+
+    /// Whatever is wrong with a file that has changed, that is why.
+    fn explain(&mut self, error: ImportError) -> ImportError {
+        self.check().err().unwrap_or(error)
+    }
+}
+
+struct Watched {
+    stream: Box<dyn ModelStream>,
+    watch: Watch,
+}
+
+impl ModelStream for Watched {
+    fn attributes(&self) -> Attributes {
+        self.stream.attributes()
+    }
+
+    fn up_axis(&self) -> UpAxis {
+        self.stream.up_axis()
+    }
+
+    fn declared_vertices(&self) -> Option<u64> {
+        self.stream.declared_vertices()
+    }
+
+    fn declared_faces(&self) -> Option<u64> {
+        self.stream.declared_faces()
+    }
+
+    fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
+        let more = self.stream.next(batch).map_err(|error| self.watch.explain(error))?;
+        if !more {
+            self.watch.check()?;
+        }
+        Ok(more)
+    }
+
+    fn bytes_consumed(&self) -> (u64, u64) {
+        self.stream.bytes_consumed()
+    }
+}
+
+impl fmt::Display for Stamp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let since = self.modified.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        write!(f, "{} bytes written {}.{:09} s after 1970", self.bytes, since.as_secs(), since.subsec_nanos())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read_all;
+    use std::io::{Read, Seek, SeekFrom};
+    use std::sync::{Arc, Mutex};
+    use std::time::Duration;
+
+    /// A file that others write to: its bytes, and when they did.
+    #[derive(Clone)]
+    struct Shared(Arc<Mutex<(Vec<u8>, Stamp)>>);
+
+    impl Shared {
+        fn change(&self, change: impl FnOnce(&mut Vec<u8>)) {
+            let (bytes, stamp) = &mut *self.0.lock().unwrap();
+            change(bytes);
+            *stamp = Stamp { bytes: bytes.len() as u64, modified: stamp.modified + Duration::from_nanos(1) };
+        }
+
+        fn open(&self) -> Result<Box<dyn ModelStream>, ImportError> {
+            let asked = self.clone();
+            let ask = Box::new(move || Ok(asked.0.lock().unwrap().1));
+            open_watched(Box::new(Source { file: self.clone(), at: 0 }), ask)
+        }
+    }
+
+    struct Source {
+        file: Shared,
+        at: u64,
+    }
+
+    impl Read for Source {
+        fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+            let file = self.file.0.lock().unwrap();
+            let mut rest = file.0.get(self.at as usize..).unwrap_or_default();
+            let count = rest.read(into)?;
+            self.at += count as u64;
+            Ok(count)
+        }
+    }
+
+    impl Seek for Source {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.at = match to {
+                SeekFrom::Start(at) => at,
+                SeekFrom::End(from) => (self.file.0.lock().unwrap().0.len() as i64 + from) as u64,
+                SeekFrom::Current(from) => (self.at as i64 + from) as u64,
+            };
+            Ok(self.at)
+        }
+    }
+
+    /// Many batches of triangles.
+    fn file() -> Shared {
+        let mut text =
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+            element face 200000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+                .to_string();
+        text.push_str(&"3 0 1 2\n".repeat(200_000));
+        let stamp = Stamp { bytes: text.len() as u64, modified: SystemTime::UNIX_EPOCH };
+        Shared(Arc::new(Mutex::new((text.into_bytes(), stamp))))
+    }
+
+    /// What becomes of a file that is changed after its first batch was read.
+    fn changed(change: impl FnOnce(&mut Vec<u8>)) -> String {
+        let file = file();
+        let mut stream = file.open().unwrap();
+        assert!(stream.next(&mut Batch::default()).unwrap());
+        file.change(change);
+        read_all(&mut *stream, &mut |_, _| {}).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_file_that_stays_as_it_is_gives_what_it_has() {
+        let mut stream = file().open().unwrap();
+        assert_eq!(read_all(&mut *stream, &mut |_, _| {}).unwrap().triangles.len(), 200_000);
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_read_is_refused_for_that() {
+        let bytes = file().0.lock().unwrap().0.len();
+        let message = |after: usize| {
+            format!(
+                "changed while it was read (expected {bytes} bytes written 0.000000000 s after 1970, \
+                 found {after} bytes written 0.000000001 s after 1970)"
+            )
+        };
+        assert_eq!(changed(|bytes| bytes.truncate(bytes.len() / 2)), message(bytes / 2), "not: the file ends before");
+        assert_eq!(changed(Vec::clear), message(0));
+        assert_eq!(changed(|bytes| bytes.extend(b"3 0 1 2\n")), message(bytes + 8), "what follows would be ignored");
+        assert_eq!(changed(|bytes| *bytes.last_mut().unwrap() = b' '), message(bytes));
+        assert_eq!(changed(|bytes| bytes[1_000_000..].fill(b'x')), message(bytes), "not: expected a number");
+    }
+
+    #[test]
+    fn a_header_that_is_being_written_is_refused_for_that() {
+        let file = file();
+        file.change(|bytes| bytes.truncate(30));
+        let mut asked = 0;
+        let stamps = [file.0.lock().unwrap().1, Stamp { bytes: 31, modified: SystemTime::UNIX_EPOCH }];
+        let ask = Box::new(move || {
+            asked += 1;
+            Ok(stamps[asked - 1])
+        });
+        let error = open_watched(Box::new(Source { file, at: 0 }), ask).err().unwrap().to_string();
+        assert!(error.starts_with("changed while it was read (expected 30 bytes"), "{error}");
+    }
+}
