@@ -3,6 +3,7 @@
 //! In: a [`Journal`]. Out: its bytes, with a checksum; or a journal of bytes that are whole. Spools that it names are on disk.
 
 use crate::InputIdentity;
+use crate::unfinished::SPOOL_SUFFIX;
 use gigalod_format::checksum;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -52,6 +53,13 @@ impl Journal {
         let body = body.strip_suffix('\n')?;
         let is_sound = first == format!("{MAGIC} {:08x}", checksum(body.as_bytes()));
         is_sound.then(|| serde_json::from_str(body).ok())?
+    }
+}
+
+impl Journal {
+    /// A file of the folder that a build cannot go on without.
+    pub(crate) fn needs(&self, name: &str) -> bool {
+        name == "journal" || name.strip_suffix(SPOOL_SUFFIX).is_some_and(|spool| self.spools.contains_key(spool))
     }
 }
 

@@ -3,6 +3,7 @@
 //! What always holds: names of unfinished files are made, changed and removed only by who holds the [`Registry`]; after
 //! [`abandon`] nobody ever does again.
 
+use crate::work;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -39,12 +40,10 @@ pub fn abandon() -> Vec<PathBuf> {
         // It may have got its name, or have been removed, a moment ago.
         let _ = std::fs::remove_file(path);
     }
-    let (kept, lost): (Vec<_>, Vec<_>) = registry.works.drain(..).partition(|work| work.can_continue);
-    for work in lost {
-        remove_folder(&work.folder);
-    }
+    registry.works.iter().for_each(work::leave);
+    let kept = registry.works.drain(..).filter(|work| work.can_continue).map(|work| work.folder).collect();
     std::mem::forget(registry);
-    kept.into_iter().map(|work| work.folder).collect()
+    kept
 }
 
 /// Files of a work folder end in one of these or are called so; anything else in it is not ours.

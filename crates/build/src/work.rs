@@ -76,15 +76,11 @@ impl Work {
                 None
             }
         };
-        let live = |name: &str| match &found {
-            Some(journal) => name == "journal" || journal.spools.contains_key(name.trim_end_matches(SPOOL_SUFFIX)),
-            None => false,
-        };
         // Without its journal first, the rest is worth nothing whenever the power goes.
         if found.is_none() {
             let _ = std::fs::remove_file(folder.join("journal"));
         }
-        unfinished::sweep(&folder, live);
+        unfinished::sweep(&folder, |name| found.as_ref().is_some_and(|journal| journal.needs(name)));
         if found.is_none() && !is_needed {
             unfinished::remove_folder(&folder);
             return Ok(None);
@@ -140,9 +136,7 @@ impl Work {
         for work in registry.works.iter_mut().filter(|work| work.folder == self.folder) {
             work.can_continue = true;
         }
-        unfinished::sweep(&self.folder, |name| {
-            matches!(name, "journal" | "pages.part") || journal.spools.contains_key(name.trim_end_matches(SPOOL_SUFFIX))
-        });
+        unfinished::sweep(&self.folder, |name| name == "pages.part" || journal.needs(name));
         Ok(())
     }
 
@@ -164,9 +158,18 @@ impl Drop for Work {
     fn drop(&mut self) {
         let mut registry = registry();
         let own = registry.works.iter().position(|work| work.folder == self.folder);
-        if own.is_some_and(|own| !registry.works.swap_remove(own).can_continue) {
-            unfinished::remove_folder(&self.folder);
+        if let Some(own) = own {
+            leave(&registry.works.swap_remove(own));
         }
+    }
+}
+
+/// Removes a folder with which nothing can be done any more; of another, what its journal does not name.
+pub(crate) fn leave(work: &Active) {
+    if !work.can_continue {
+        unfinished::remove_folder(&work.folder);
+    } else if let Found::Journal(journal) = Found::read(&work.folder) {
+        unfinished::sweep(&work.folder, |name| journal.needs(name));
     }
 }
 

@@ -3,13 +3,13 @@
 
 mod cli_support;
 
-use cli_support::{Ran, command, folder, names_in, strips};
+use cli_support::builds::{Place, interrupted};
+use cli_support::{Ran, command, folder, names_in};
 use serde_json::Value;
-use std::ffi::OsStr;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -34,56 +34,6 @@ fn big() -> &'static Big {
         assert!(std::fs::read(&out).unwrap() == glod, "in memory as out of it");
         Big { ply, glod, took }
     })
-}
-
-/// An output in a folder of its own.
-struct Place {
-    folder: tempfile::TempDir,
-    out: PathBuf,
-    work: PathBuf,
-}
-
-impl Place {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let (out, work) = (folder.path().join("a.glod"), folder.path().join(".a.glod.build"));
-        Self { folder, out, work }
-    }
-
-    fn spawn(&self, input: &Path, options: &[&str]) -> Child {
-        let mut command = command();
-        command.arg("build").arg(input).arg("-o").arg(&self.out).args(["--memory", "64MiB"]).args(options);
-        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
-    }
-
-    fn resume(&self, input: &Path) -> Ran {
-        run!["build", input, "-o", self.out, "--memory", "64MiB", "--resume", "--json"]
-    }
-
-    /// The phase that the journal says is finished.
-    fn journaled(&self) -> Option<String> {
-        let text = std::fs::read_to_string(self.work.join("journal")).ok()?;
-        let body: Value = serde_json::from_str(text.lines().nth(1)?).ok()?;
-        Some(body["phase"].as_str()?.to_string())
-    }
-
-    /// Waits until so many phases are finished, and ends the process as nobody can prevent.
-    fn kill_after(&self, child: &mut Child, phases: usize) -> Option<String> {
-        let order = ["read", "leaves", "tree", "quantise"];
-        let has_come = |phase: &String| order.iter().position(|name| name == phase).unwrap() + 1 >= phases;
-        while child.try_wait().unwrap().is_none() && !self.journaled().as_ref().is_some_and(has_come) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        child.kill().unwrap();
-        child.wait().unwrap();
-        self.journaled()
-    }
-
-    #[track_caller]
-    fn expect_done(&self, bytes: &[u8]) {
-        assert!(std::fs::read(&self.out).unwrap() == bytes, "the bytes of a build that nobody interrupted");
-        assert_eq!(names_in(self.folder.path()), ["a.glod"], "nothing else");
-    }
 }
 
 #[test]
@@ -145,33 +95,6 @@ fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now(
         assert_eq!(names.last().unwrap(), "write");
         place.expect_done(&big.glod);
     }
-}
-
-/// Runs a build that fails for want of room as soon as a file has more than so many bytes.
-fn build_within(file_bytes: u64, arguments: &[&OsStr]) -> Ran {
-    let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", file_bytes / 512);
-    let mut shell = Command::new("sh");
-    shell.arg("-c").arg(script).arg(env!("CARGO_BIN_EXE_gigalod")).args(arguments).stdin(Stdio::null());
-    Ran::of(shell.output().unwrap())
-}
-
-/// A small model and its build, interrupted after the leaves.
-fn interrupted() -> (Place, PathBuf, Vec<u8>) {
-    let place = Place::new();
-    let ply = place.folder.path().join("strips.ply");
-    // Positions and triangles take 24 bytes a vertex, kept nodes more.
-    const SIDE: u64 = 130;
-    std::fs::write(&ply, strips(SIDE as usize)).unwrap();
-    run!["build", ply, "-o", place.out].done();
-    let bytes = std::fs::read(&place.out).unwrap();
-    std::fs::remove_file(&place.out).unwrap();
-    let arguments = [OsStr::new("build"), ply.as_ref(), "-o".as_ref(), place.out.as_ref(), "--json".as_ref()];
-    let ran = build_within(SIDE * SIDE * 25, &arguments);
-    assert!(ran.failed(&place.out).contains("temporary files"), "{ran:?}");
-    assert!(ran.stderr.ends_with("\nhint: continue with --resume\n"), "{ran:?}");
-    assert_eq!(place.journaled().as_deref(), Some("leaves"));
-    assert_eq!(names_in(place.folder.path()), [".a.glod.build", "strips.ply"]);
-    (place, ply, bytes)
 }
 
 #[test]
@@ -302,6 +225,7 @@ fn an_interrupted_build_says_that_it_can_go_on_if_it_can() {
         assert!(stays || phases == 0);
         assert_eq!(names_in(place.folder.path()), if stays { &[".a.glod.build"][..] } else { &[] });
         if stays {
+            place.expect_tidy();
             assert!(place.resume(&big.ply).done().json()["resumed_after"].is_string());
             place.expect_done(&big.glod);
         }

@@ -1,6 +1,9 @@
 //! What the tests of the command line share: running the program, small models, reading what it writes.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+#[cfg(unix)]
+pub(crate) mod builds;
+
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs::File;
