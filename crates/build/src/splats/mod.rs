@@ -60,7 +60,7 @@ pub fn build(
     expect_no_folder(out).map_err(BuildError::Output)?;
     let phases = Phases::new(progress);
     let workers = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
+        .num_threads(plan::threads(options))
         .build()
         .map_err(|error| BuildError::Threads(error.to_string()))?;
 

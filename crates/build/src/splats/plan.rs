@@ -20,10 +20,22 @@ const WORK_PER_TRIANGLE: u64 = 12 + 3 * (8 + 24 + 16 + 16);
 /// Bytes of work for each leaf of a block: the leaf, its kept nodes, and a share of the trees in work.
 const WORK_PER_LEAF: u64 = 160;
 
+/// Bytes of work of each thread: the tree of a chunk (`chunk::TREE`), what becomes of it, and a chunk that is quantised.
+const WORK_PER_THREAD: u64 = 13 << 20;
+
 #[derive(Debug)]
 pub(super) struct MemoryPlan<'a> {
     budget: u64,
     place: Place<'a>,
+}
+
+/// Threads to work with: as many as are asked for, or one a core, but no more than memory has room for.
+pub(super) fn threads(options: &Options) -> usize {
+    let asked = match options.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        threads => threads,
+    };
+    asked.clamp(1, (options.memory_bytes / 2 / WORK_PER_THREAD).max(1) as usize)
 }
 
 /// Decides by what the stream declares; a stream that declares nothing is spooled to files.
