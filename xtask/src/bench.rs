@@ -3,24 +3,16 @@
 //! Times are user and system seconds of whole processes with a warm page cache, the median of three runs, side by side in one
 //! call; a ratio between two rows means more than either.
 
+use crate::figures::{self, Row, at_least, at_most, plain};
+use crate::program::{Program, number};
 use crate::setup;
-use crate::steps::{cargo, project, run};
+use crate::steps::{cargo, project, run, target};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 const RUNS: usize = 3;
-
-/// One line of the report.
-struct Row {
-    figure: String,
-    target: String,
-    measured: String,
-    /// None where there is nothing to meet.
-    met: Option<bool>,
-}
 
 pub(crate) fn bench(arguments: &[String]) -> Result<()> {
     let large = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
@@ -29,10 +21,8 @@ pub(crate) fn bench(arguments: &[String]) -> Result<()> {
         _ => bail!("usage: cargo xtask bench [--large]"),
     };
     setup::system()?;
-    run(&mut cargo(&["build", "--release", "--package", "gigalod"]))?;
     run(&mut cargo(&["build", "--release", "--package", "gigalod-format", "--example", "decode_speed"]))?;
-    let bench = Bench { program: project().join("target/release/gigalod"), folder: project().join("target/bench") };
-    std::fs::create_dir_all(&bench.folder)?;
+    let bench = Bench(Program::build("bench")?);
     let mut rows = Vec::new();
     bench.splats(&mut rows)?;
     if large {
@@ -44,48 +34,28 @@ pub(crate) fn bench(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-struct Bench {
-    program: PathBuf,
-    folder: PathBuf,
-}
+struct Bench(Program);
 
 impl Bench {
-    fn gigalod(&self, arguments: &[&str]) -> Result<Value> {
-        let out = Command::new(&self.program).arg("--json").args(arguments).current_dir(&self.folder).output()?;
-        let text = String::from_utf8_lossy(&out.stdout);
-        if !out.status.success() {
-            bail!("gigalod {}: {text}", arguments.join(" "));
-        }
-        serde_json::from_str(&text).with_context(|| format!("gigalod {}", arguments.join(" ")))
-    }
-
-    /// A model of the bench folder, made once.
-    fn make(&self, name: &str, arguments: &[&str]) -> Result<()> {
-        if !self.folder.join(name).is_file() {
-            self.gigalod(&[arguments, &["-o", name]].concat())?;
-        }
-        Ok(())
-    }
-
     /// Three builds; the one in the middle by processor time.
     fn build(&self, model: &str, threads: &str) -> Result<Value> {
         let mut runs = (0..RUNS)
-            .map(|_| self.gigalod(&["build", model, "-o", "out.glod", "--threads", threads]))
+            .map(|_| self.0.gigalod(&["build", model, "-o", "out.glod", "--threads", threads]))
             .collect::<Result<Vec<_>>>()?;
         runs.sort_by(|a, b| number(a, "cpu_seconds").total_cmp(&number(b, "cpu_seconds")));
         Ok(runs.swap_remove(RUNS / 2))
     }
 
     fn splats(&self, rows: &mut Vec<Row>) -> Result<()> {
-        self.make("statue7.ply", &["synth", "statue", "--triangles", "7M"])?;
-        self.make("statue7_shuffled.ply", &["synth", "statue", "--triangles", "7M", "--order", "shuffled"])?;
-        self.make("statue7_colors.ply", &["synth", "statue", "--triangles", "7M", "--colors"])?;
+        self.0.make("statue7.ply", &["synth", "statue", "--triangles", "7M"])?;
+        self.0.make("statue7_shuffled.ply", &["synth", "statue", "--triangles", "7M", "--order", "shuffled"])?;
+        self.0.make("statue7_colors.ply", &["synth", "statue", "--triangles", "7M", "--colors"])?;
         let mut models = vec![("statue, coherent", "statue7.ply"), ("statue, shuffled", "statue7_shuffled.ply")];
         let scan = std::env::var_os("GIGALOD_DATA").map(|data| Path::new(&data).join("scans/dragon_vrip.ply.gz"));
         match scan.filter(|scan| scan.is_file()) {
             Some(scan) => {
                 let scan = scan.to_string_lossy().into_owned();
-                self.make("dragons7.ply", &["synth", "replicate", &scan, "--triangles", "7M"])?;
+                self.0.make("dragons7.ply", &["synth", "replicate", &scan, "--triangles", "7M"])?;
                 models.push(("dragon, replicated", "dragons7.ply"));
             }
             None => println!("GIGALOD_DATA not set: no real scan is measured"),
@@ -116,9 +86,9 @@ impl Bench {
         let per_leaf = number(&colored, "output_bytes") / number(&colored, "leaves");
         rows.push(at_most("file, statue with colours".into(), per_leaf, 6.5, "bytes a leaf (goal 5)"));
 
-        self.gigalod(&["build", "statue7.ply", "-o", "statue7.glod"])?;
-        let decode = project().join("target/release/examples/decode_speed");
-        let out = Command::new(decode).arg(self.folder.join("statue7.glod")).output()?;
+        self.0.gigalod(&["build", "statue7.ply", "-o", "statue7.glod"])?;
+        let decode = target().join("release/examples/decode_speed");
+        let out = Command::new(decode).arg(self.0.folder.join("statue7.glod")).output()?;
         let text = String::from_utf8_lossy(&out.stdout).into_owned();
         let rate = text.split_whitespace().next().and_then(|word| word.parse().ok()).context(text)?;
         rows.push(at_least("decoding, statue, one thread".into(), rate, 20.0, "M nodes a second"));
@@ -126,8 +96,8 @@ impl Bench {
     }
 
     fn large(&self, rows: &mut Vec<Row>) -> Result<()> {
-        self.make("statue100.ply", &["synth", "statue", "--triangles", "100M"])?;
-        let run = self.gigalod(&["build", "statue100.ply", "-o", "statue100.glod", "--memory", "512MiB"])?;
+        self.0.make("statue100.ply", &["synth", "statue", "--triangles", "100M"])?;
+        let run = self.0.gigalod(&["build", "statue100.ply", "-o", "statue100.glod", "--memory", "512MiB"])?;
         let peak = number(&run, "peak_memory_bytes") / f64::from(1 << 20);
         rows.push(at_most("peak anonymous memory, 100 M triangles, --memory 512MiB".into(), peak, 640.0, "MiB"));
         let rate = number(&run, "leaves") / number(&run, "cpu_seconds") / 1e6;
@@ -137,51 +107,20 @@ impl Bench {
         ));
         let per_leaf = number(&run, "output_bytes") / number(&run, "leaves");
         rows.push(at_most("file, 100 M triangles".into(), per_leaf, 4.5, "bytes a leaf (goal 3.5)"));
-        let first = self.gigalod(&["render", "statue100.glod", "-o", "first.png", "--error", "4"])?;
+        let first = self.0.gigalod(&["render", "statue100.glod", "-o", "first.png", "--error", "4"])?;
         let share = number(&first, "bytes_read") / number(&run, "output_bytes") * 100.0;
         rows.push(at_most("first picture, --error 4: read of the file".into(), share, 0.5, "%"));
         Ok(())
     }
 }
 
-fn number(object: &Value, key: &str) -> f64 {
-    object[key].as_f64().unwrap_or(f64::NAN)
-}
-
-fn at_least(figure: String, measured: f64, target: f64, unit: &str) -> Row {
-    let measured_text = format!("{measured:.2} {unit}");
-    Row { figure, target: format!("≥ {target}"), measured: measured_text, met: Some(measured >= target) }
-}
-
-fn at_most(figure: String, measured: f64, target: f64, unit: &str) -> Row {
-    let measured_text = format!("{measured:.2} {unit}");
-    Row { figure, target: format!("≤ {target}"), measured: measured_text, met: Some(measured <= target) }
-}
-
-fn plain(figure: String, measured: String) -> Row {
-    Row { figure, target: String::new(), measured, met: None }
-}
-
 fn report(rows: &[Row], large: bool) -> Result<String> {
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let cpu = cpu
-        .lines()
-        .find_map(|line| line.strip_prefix("model name"))
-        .map_or("unknown", |name| name.trim_matches([' ', '\t', ':']));
-    let cores = std::thread::available_parallelism()?;
     let mut out = format!(
-        "# Benchmarks\n\nWritten by `cargo xtask bench{}` on {cores} cores of {cpu}; default options unless said otherwise. Times are user\n\
-         and system seconds of whole processes, the median of {RUNS} runs, page cache warm. A target that is missed says so.\n\n\
-         | figure | measured | target | |\n|---|---|---|---|\n",
-        if large { " --large" } else { "" }
+        "# Benchmarks\n\nWritten by `cargo xtask bench{}` on {}; default options unless said otherwise. Times are user\n\
+         and system seconds of whole processes, the median of {RUNS} runs, page cache warm. A target that is missed says so.\n\n",
+        if large { " --large" } else { "" },
+        figures::machine()?
     );
-    for Row { figure, target, measured, met } in rows {
-        let verdict = match met {
-            Some(true) => "met",
-            Some(false) => "**missed**",
-            None => "",
-        };
-        writeln!(out, "| {figure} | {} | {target} | {verdict} |", measured.trim())?;
-    }
+    figures::table(rows, &mut out);
     Ok(out)
 }

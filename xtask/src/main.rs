@@ -4,8 +4,12 @@
 #![forbid(unsafe_code)]
 
 mod bench;
+mod figures;
+mod program;
 mod setup;
+mod soak;
 mod steps;
+mod watch;
 
 use anyhow::{Result, bail};
 
@@ -15,6 +19,8 @@ cargo xtask COMMAND
   demo [ARGS]   make a statue of 2 million triangles, build it, draw four pictures into ./demo
   test          everything CI runs: format, lints, documentation, tests, shaders, web build
   bench [--large]  measure against the targets, write docs/benchmarks.md (about 5 minutes; with 100 M triangles 10)
+  soak [--triangles N] [--largest]  what takes too long for `test`: 50 kills of a build of 5 million triangles; memory, disk
+                and verify of 100 million (or N), written to docs/soak.md; with 372 million as well, which needs 30 GB of disk
   setup         install what demo and test need (they do it by themselves)
 
 Environment of `test` and `bench`:
@@ -30,6 +36,7 @@ fn main() -> Result<()> {
         "setup" => setup::everything(),
         "demo" => steps::demo(&rest),
         "bench" => bench::bench(&rest),
+        "soak" => soak::soak(&rest),
         "test" if rest.is_empty() => steps::test(),
         "" | "help" | "-h" | "--help" => {
             print!("{HELP}");
