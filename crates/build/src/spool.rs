@@ -26,7 +26,7 @@ pub(crate) enum Place<'a> {
 #[derive(Debug)]
 pub(crate) enum Spool<T> {
     Memory(Vec<T>),
-    File { file: File, len: u64, name: Option<&'static str> },
+    File { file: File, len: u64, name: Option<String> },
 }
 
 impl<T: Pod> Spool<T> {
@@ -41,26 +41,26 @@ impl<T: Pod> Spool<T> {
         Ok(Self::File { file: tempfile::tempfile_in(folder)?, len: 0, name: None })
     }
 
-    /// For what a later phase needs. No other spool of the build has the same name.
-    pub(crate) fn named(place: &Place<'_>, name: &'static str) -> io::Result<Self> {
+    /// For what a later step needs. No two steps in a row use the same name for different things.
+    pub(crate) fn named(place: &Place<'_>, name: &str) -> io::Result<Self> {
         match place {
-            Place::Work(work) => Ok(Self::File { file: work.create(name)?, len: 0, name: Some(name) }),
+            Place::Work(work) => Ok(Self::File { file: work.create(name)?, len: 0, name: Some(name.to_string()) }),
             other => Self::new(other),
         }
     }
 
     /// As an earlier process left it.
-    pub(crate) fn reopen(work: &Work, name: &'static str) -> io::Result<Self> {
+    pub(crate) fn reopen(work: &Work, name: &str) -> io::Result<Self> {
         let (file, len) = work.reopen(name, size_of::<T>() as u64)?;
-        Ok(Self::File { file, len, name: Some(name) })
+        Ok(Self::File { file, len, name: Some(name.to_string()) })
     }
 
     /// Puts all of it on disk, for [`Work::finish`].
-    pub(crate) fn secure(&self) -> io::Result<(&'static str, Extent)> {
+    pub(crate) fn secure(&self) -> io::Result<(String, Extent)> {
         match self {
             Self::File { file, len, name: Some(name) } => {
                 file.sync_all()?;
-                Ok((name, Extent { records: *len, record_bytes: size_of::<T>() as u64 }))
+                Ok((name.clone(), Extent { records: *len, record_bytes: size_of::<T>() as u64 }))
             }
             _ => Err(io::Error::other("a spool without a name cannot be kept")),
         }

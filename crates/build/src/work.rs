@@ -11,7 +11,6 @@ use crate::journal::{Extent, Header, Journal};
 use crate::output::{folder_of, sync_folder};
 use crate::unfinished::{self, Active, SPOOL_SUFFIX, registry};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -98,7 +97,7 @@ impl Work {
         self.found.as_ref()
     }
 
-    /// Creates the file of a spool. No two phases use the same name.
+    /// Creates the file of a spool; one that the journal names must not have its name.
     pub(crate) fn create(&self, name: &str) -> io::Result<File> {
         let _names = registry();
         File::options().read(true).write(true).create(true).truncate(true).open(self.path_of(name))
@@ -119,11 +118,10 @@ impl Work {
     pub(crate) fn finish(
         &self,
         phase: &str,
-        spools: impl IntoIterator<Item = (&'static str, Extent)>,
+        spools: impl IntoIterator<Item = (String, Extent)>,
         state: Value,
     ) -> io::Result<()> {
-        let spools: BTreeMap<String, Extent> =
-            spools.into_iter().map(|(name, extent)| (name.to_string(), extent)).collect();
+        let spools = spools.into_iter().collect();
         let journal = Journal { header: self.header.clone(), phase: phase.into(), spools, state };
         let mut registry = registry();
         let new = self.folder.join("journal.new");

@@ -7,6 +7,7 @@ use cli_support::builds::{Place, SMALL_VERTICES, small};
 use cli_support::{Ran, names_in, statue};
 use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 
 /// It failed as it should: the folder stays if a phase is finished, and then it says so.
 #[track_caller]
@@ -48,7 +49,7 @@ fn files_that_cannot_grow_stop_a_build_in_each_phase_and_it_goes_on_when_they_ca
     std::fs::remove_file(&place.out).unwrap();
 
     // From each phase on.
-    for (phases, name, bytes_per_vertex) in [(1, "read", 3.0), (3, "tree", 3.0), (4, "quantise", 1.0)] {
+    for (phases, name, bytes_per_vertex) in [(1, "read", 3.0), (4, "tree", 3.0), (5, "quantise", 1.0)] {
         leave_after(&place, &ply, phases, name);
         expect_failure(
             &place,
@@ -66,7 +67,7 @@ fn files_that_cannot_grow_stop_a_build_in_each_phase_and_it_goes_on_when_they_ca
 fn leave_after(place: &Place, ply: &Path, phases: usize, name: &str) {
     loop {
         let mut child = place.spawn(ply, &["--resume", "--threads", "1"]);
-        if place.kill_after(&mut child, phases).as_deref() == Some(name) {
+        if place.kill_after(&mut child, phases, Duration::ZERO).as_deref() == Some(name) {
             return;
         }
         // Too late: once more.

@@ -49,16 +49,16 @@ fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
     let mut kills = 0;
     while kills < 10 {
         let mut child = place.spawn(&big.ply, &["--resume"]);
-        // Of a run that goes on less is left than of one that begins.
-        std::thread::sleep(big.took.mul_f64(random() * if place.work.exists() { 0.5 } else { 1.0 }));
-        child.kill().unwrap();
+        // From the first phase to the last, at any moment of it.
+        let phases = kills * 6 / 10;
+        let last = place.kill_after(&mut child, phases, big.took.mul_f64(random() / 6.0));
         if child.wait().unwrap().success() {
             // It was done before its time: once more from the beginning.
             place.expect_done(&big.glod);
             std::fs::remove_file(&place.out).unwrap();
         } else {
             kills += 1;
-            println!("killed after {:?}", place.journaled());
+            println!("killed after {last:?}");
             let names = names_in(place.folder.path());
             // Of a build that had its name a moment ago, but had not put its work away yet.
             if place.out.exists() {
@@ -77,15 +77,22 @@ fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
 #[test]
 fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now() {
     let big = big();
-    let others = [["--memory", "64MiB"], ["--memory", "4GiB"], ["--threads", "1"], ["--memory", "100MiB"]];
+    let others = [
+        ["--memory", "64MiB"],
+        ["--memory", "4GiB"],
+        ["--memory", "256MiB"],
+        ["--threads", "1"],
+        ["--memory", "100MiB"],
+    ];
     for (phases, options) in (1..).zip(others) {
         let place = Place::new();
         // Where the machine is so busy that the build was over before it could be killed: once more.
         let phase = std::iter::repeat_with(|| {
             let mut child = place.spawn(&big.ply, &["--threads", "2"]);
-            place.kill_after(&mut child, phases)
+            place.kill_after(&mut child, phases, Duration::ZERO)
         });
         let phase = phase.flatten().next().unwrap();
+        println!("goes on after {phase}");
         let ran = run!["build", big.ply, "-o", place.out, "--resume", "--json", options[0], options[1]].done();
         assert_eq!(ran.stderr, "", "nothing to note");
         assert_eq!(ran.json()["resumed_after"], *phase);

@@ -4,11 +4,11 @@
 //! of the rest, lists become spools too, and single facts stand in the journal.
 
 use super::contract::Plan;
-use super::divide::Chunks;
+use super::divide::{Chunks, Division};
 use super::leaves::Leaf;
 use super::mesh::Mesh;
 use super::quantise::Quantised;
-use super::tree::Binary;
+use super::tree::{Binary, Extent};
 use crate::spool::{Place, Spool};
 use crate::work::Work;
 use bytemuck::{Pod, Zeroable};
@@ -16,14 +16,19 @@ use gigalod_format::InputCounts;
 use gigalod_format::splats::Node;
 use gigalod_geom::{Aabb, Sphere};
 use glam::{DVec3, Vec3};
+use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::io;
+
+/// Within the longest step.
+const DIVIDING: &str = "part of tree";
 
 /// What there is after each step.
 pub(super) enum Stage {
     Start,
     Read(Mesh),
     Leaves(Facts, Spool<Leaf>),
+    Dividing(Facts, Division),
     Tree(Facts, Chunks),
     Quantised(Facts, Quantised, Spool<u16>),
 }
@@ -64,6 +69,8 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
             work.finish("read", spools, Value::Null)
         }
         Stage::Leaves(facts, leaves) => work.finish("leaves", [leaves.secure()?], facts.to_json()),
+        // Was saved when it was made.
+        Stage::Dividing(..) => Ok(()),
         Stage::Tree(facts, Chunks { kept, colors, sizes, top }) => {
             let lists = [list(&place, "chunk_sizes", sizes)?, list(&place, "top", &records(top))?];
             work.finish("tree", [kept.secure()?, colors.secure()?].into_iter().chain(lists), facts.to_json())
@@ -84,6 +91,30 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
     }
 }
 
+/// Keeps how far a division has come. Names have numbers that grow from each time to the next: what the journal names stays
+/// as it is until the next journal is there.
+pub(super) fn save_division(work: &Work, facts: &Facts, division: &Division) -> io::Result<()> {
+    let place = Place::Work(work);
+    let of = |what: &str| format!("{what}{}-{}", division.sets, division.done);
+    let Chunks { kept, colors, sizes, .. } = &division.chunks;
+    let extents: Vec<_> = division.pending.iter().map(|(_, b)| [b.min.to_array(), b.max.to_array()]).collect();
+    let shape: Vec<u8> = division.shape.iter().map(|is_chunk| u8::from(*is_chunk)).collect();
+    let mut spools = vec![
+        kept.secure()?,
+        colors.secure()?,
+        list(&place, &of("sizes"), sizes)?,
+        list(&place, &of("shape"), &shape)?,
+        list(&place, &of("roots"), &records(&division.roots))?,
+        list(&place, &of("extents"), &extents)?,
+    ];
+    let pending = division.pending.iter().map(|(leaves, _)| leaves.secure()).collect::<io::Result<Vec<_>>>()?;
+    let mut state = facts.to_json();
+    state["progress"] = json!([division.sets, division.done]);
+    state["pending"] = pending.iter().map(|(name, _)| name.as_str()).collect();
+    spools.extend(pending);
+    work.finish(DIVIDING, spools, state)
+}
+
 /// The stage that an earlier process has come to, and its name.
 pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
     let Some((work, journal)) = work.and_then(|work| Some((work, work.found()?))) else {
@@ -99,6 +130,30 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
             triangles: Spool::reopen(work, "triangles")?,
         }),
         "leaves" => Stage::Leaves(facts()?, Spool::reopen(work, "leaves")?),
+        DIVIDING => {
+            let numbers: [u64; 2] = of_json(&journal.state, "progress").ok_or_else(odd)?;
+            let names: Vec<String> = of_json(&journal.state, "pending").ok_or_else(odd)?;
+            let of = |what: &str| format!("{what}{}-{}", numbers[0], numbers[1]);
+            let extents: Vec<[[f32; 3]; 2]> = unlist(work, &of("extents"))?;
+            let pending = std::iter::zip(names, extents).map(|(name, [min, max])| {
+                let extent = Extent { min: Vec3::from_array(min), max: Vec3::from_array(max) };
+                Ok((Spool::reopen(work, &name)?, extent))
+            });
+            let division = Division {
+                chunks: Chunks {
+                    kept: Spool::reopen(work, "kept")?,
+                    colors: Spool::reopen(work, "kept_colors")?,
+                    sizes: unlist(work, &of("sizes"))?,
+                    top: vec![],
+                },
+                shape: unlist::<u8>(work, &of("shape"))?.iter().map(|is_chunk| *is_chunk != 0).collect(),
+                roots: nodes_of(unlist(work, &of("roots"))?),
+                pending: pending.collect::<io::Result<_>>()?,
+                sets: numbers[0],
+                done: numbers[1],
+            };
+            Stage::Dividing(facts()?, division)
+        }
         "tree" => {
             let chunks = Chunks {
                 kept: Spool::reopen(work, "kept")?,
@@ -139,9 +194,9 @@ impl Facts {
     }
 
     fn of_json(state: &Value) -> Option<Self> {
-        let vector = |key: &str| Some(DVec3::from_array(serde_json::from_value(state[key].clone()).ok()?));
+        let vector = |key: &str| Some(DVec3::from_array(of_json(state, key)?));
         Some(Self {
-            counts: serde_json::from_value(state["counts"].clone()).ok()?,
+            counts: of_json(state, "counts")?,
             origin: vector("origin")?,
             bounds: Aabb { min: vector("min")?, max: vector("max")? },
             closed: state["closed"].as_bool()?,
@@ -150,17 +205,17 @@ impl Facts {
     }
 }
 
-fn list<T: Pod>(
-    place: &Place<'_>,
-    name: &'static str,
-    all: &[T],
-) -> io::Result<(&'static str, crate::journal::Extent)> {
+fn of_json<T: DeserializeOwned>(state: &Value, key: &str) -> Option<T> {
+    serde_json::from_value(state[key].clone()).ok()
+}
+
+fn list<T: Pod>(place: &Place<'_>, name: &str, all: &[T]) -> io::Result<(String, crate::journal::Extent)> {
     let mut spool = Spool::named(place, name)?;
     spool.push(all)?;
     spool.secure()
 }
 
-fn unlist<T: Pod>(work: &Work, name: &'static str) -> io::Result<Vec<T>> {
+fn unlist<T: Pod>(work: &Work, name: &str) -> io::Result<Vec<T>> {
     let spool = Spool::reopen(work, name)?;
     let mut all = Vec::new();
     spool.read_vec(0, spool.len() as usize, &mut all)?;

@@ -25,52 +25,84 @@ pub(super) struct Chunks {
     pub(super) top: Vec<Binary>,
 }
 
-/// Splits `leaves` into chunks and raises them all.
+/// Chunks that are raised, and leaves that are still to be: a place in the work that one can go on from.
+pub(super) struct Division {
+    /// What is raised. Its top is still to come.
+    pub(super) chunks: Chunks,
+    /// Preorder of the tree on top: true for a chunk.
+    pub(super) shape: Vec<bool>,
+    /// One for each chunk.
+    pub(super) roots: Vec<Binary>,
+    /// Sets of leaves to come, the next one last.
+    pub(super) pending: Vec<(Spool<Leaf>, Extent)>,
+    /// Leaves of finished chunks.
+    pub(super) done: u64,
+    /// Sets that were ever split off; they are named by their number.
+    pub(super) sets: u64,
+}
+
+/// All of these leaves that are read and written between two places to go on from: a quarter of the model.
+const SAVE_EVERY: u64 = 4;
+
+impl Division {
+    /// Nothing is done yet.
+    pub(super) fn new(leaves: Spool<Leaf>, plan: &MemoryPlan<'_>) -> io::Result<Self> {
+        let mut extent = Extent::EMPTY;
+        leaves.for_each_piece(MemoryPlan::PIECE, |_, piece| {
+            extent = piece.iter().fold(extent, Extent::including);
+            Ok(())
+        })?;
+        let chunks = Chunks {
+            kept: Spool::named(&plan.place(), "kept")?,
+            colors: Spool::named(&plan.place(), "kept_colors")?,
+            sizes: vec![],
+            top: vec![],
+        };
+        let pending = vec![(leaves, extent)];
+        Ok(Self { chunks, shape: vec![], roots: vec![], pending, done: 0, sets: 0 })
+    }
+}
+
+/// Splits what is pending into chunks and raises them all. `save` is told now and then how far that has come.
 pub(super) fn divide(
-    leaves: Spool<Leaf>,
+    division: Division,
     has_colors: bool,
     plan: &MemoryPlan<'_>,
     phases: &Phases<'_>,
+    mut save: impl FnMut(&Division) -> io::Result<()>,
 ) -> Result<Chunks, BuildError> {
-    phases.begin("tree", leaves.len());
-    let chunks = Chunks {
-        kept: Spool::named(&plan.place(), "kept").map_err(BuildError::Scratch)?,
-        colors: Spool::named(&plan.place(), "kept_colors").map_err(BuildError::Scratch)?,
-        sizes: vec![],
-        top: vec![],
-    };
-    let mut division = Division { chunks, shape: Vec::new(), roots: Vec::new(), has_colors, plan, phases, done: 0 };
-    let mut extent = Extent::EMPTY;
-    leaves
-        .for_each_piece(MemoryPlan::PIECE, |_, piece| {
-            extent = piece.iter().fold(extent, Extent::including);
-            Ok(())
-        })
-        .map_err(BuildError::Scratch)?;
-    match leaves {
-        Spool::Memory(mut all) => division.block(&mut all, extent).map_err(BuildError::Scratch)?,
-        file => division.set(file, extent)?,
+    let total = division.done + division.pending.iter().map(|(leaves, _)| leaves.len()).sum::<u64>();
+    phases.begin("tree", total);
+    let mut divider = Divider { division, has_colors, plan, phases };
+    let mut unsaved = 0;
+    while let Some((leaves, extent)) = divider.division.pending.pop() {
+        unsaved += leaves.len();
+        divider.set(leaves, extent)?;
+        if unsaved >= total / SAVE_EVERY && !divider.division.pending.is_empty() {
+            save(&divider.division).map_err(BuildError::Scratch)?;
+            unsaved = 0;
+        }
     }
-    let Division { mut chunks, shape, roots, .. } = division;
+    let Division { mut chunks, shape, roots, .. } = divider.division;
     chunks.top = top_of(&shape, roots);
     Ok(chunks)
 }
 
-struct Division<'a> {
-    chunks: Chunks,
-    /// Preorder of the tree on top: true for a chunk.
-    shape: Vec<bool>,
-    roots: Vec<Binary>,
+struct Divider<'a> {
+    division: Division,
     has_colors: bool,
     plan: &'a MemoryPlan<'a>,
     phases: &'a Phases<'a>,
-    done: u64,
 }
 
-impl Division<'_> {
-    /// A set of leaves in a file.
+impl Divider<'_> {
+    /// Raises a set of leaves, or splits it in two.
     fn set(&mut self, leaves: Spool<Leaf>, extent: Extent) -> Result<(), BuildError> {
         let at_once = self.plan.leaves_at_once() as u64;
+        let leaves = match leaves {
+            Spool::Memory(mut all) => return self.block(&mut all, extent).map_err(BuildError::Scratch),
+            file => file,
+        };
         if leaves.len() <= at_once {
             let mut all = Vec::new();
             leaves.read_vec(0, leaves.len() as usize, &mut all).map_err(BuildError::Scratch)?;
@@ -80,8 +112,7 @@ impl Division<'_> {
         let Some(plane) = extent.plane() else {
             return Err(BuildError::Crowd { vertices: leaves.len(), most: at_once });
         };
-        let mut halves =
-            [(); 2].map(|()| Half { leaves: Spool::new(&self.plan.place()), extent: Extent::EMPTY, waiting: vec![] });
+        let mut halves = [self.half()?, self.half()?];
         let sort = |_: u64, piece: &[Leaf]| {
             for leaf in piece {
                 let half = &mut halves[usize::from(!plane.is_left(leaf))];
@@ -92,11 +123,17 @@ impl Division<'_> {
         };
         leaves.for_each_piece(MemoryPlan::PIECE, sort).map_err(BuildError::Scratch)?;
         drop(leaves);
-        self.shape.push(false);
-        for half in halves {
-            self.set(half.leaves.map_err(BuildError::Scratch)?, half.extent)?;
-        }
+        self.division.shape.push(false);
+        let [left, right] = halves.map(|half| (half.leaves, half.extent));
+        self.division.pending.extend([right, left]);
         Ok(())
+    }
+
+    fn half(&mut self) -> Result<Half, BuildError> {
+        self.division.sets += 1;
+        let name = format!("set{}", self.division.sets);
+        let leaves = Spool::named(&self.plan.place(), &name).map_err(BuildError::Scratch)?;
+        Ok(Half { leaves, extent: Extent::EMPTY, waiting: vec![] })
     }
 
     /// A set of leaves in memory.
@@ -104,37 +141,36 @@ impl Division<'_> {
         let count = leaves.len() as u64;
         // So much at a time that finished chunks do not pile up before they are put away.
         if leaves.len() > self.plan.leaves_at_once() {
-            self.shape.push(false);
+            self.division.shape.push(false);
             let (middle, [left_extent, right_extent]) = tree::split(leaves, extent);
             let (left, right) = leaves.split_at_mut(middle);
             self.block(left, left_extent)?;
             return self.block(right, right_extent);
         }
         let part = raise_all(leaves, extent, self.has_colors);
-        self.shape.extend(part.shape);
+        let Division { chunks, shape, roots, done, .. } = &mut self.division;
+        shape.extend(part.shape);
         for raised in part.raised {
-            self.chunks.kept.push(&raised.kept)?;
-            self.chunks.colors.push(&raised.colors)?;
-            self.chunks.sizes.push(raised.kept.len() as u32);
-            self.roots.push(raised.root);
+            chunks.kept.push(&raised.kept)?;
+            chunks.colors.push(&raised.colors)?;
+            chunks.sizes.push(raised.kept.len() as u32);
+            roots.push(raised.root);
         }
-        self.done += count;
-        self.phases.at(self.done);
+        *done += count;
+        self.phases.at(*done);
         Ok(())
     }
 }
 
 struct Half {
-    leaves: io::Result<Spool<Leaf>>,
+    leaves: Spool<Leaf>,
     extent: Extent,
     waiting: Vec<Leaf>,
 }
 
 impl Half {
     fn flush(&mut self) -> io::Result<()> {
-        if let Ok(leaves) = &mut self.leaves {
-            leaves.push(&self.waiting)?;
-        }
+        self.leaves.push(&self.waiting)?;
         self.waiting.clear();
         Ok(())
     }

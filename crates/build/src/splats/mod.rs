@@ -37,6 +37,7 @@ use crate::spool::Place;
 use crate::work::Work;
 use crate::{BuildError, Options};
 use checkpoint::{Facts, Stage};
+use divide::Division;
 use gigalod_format::splats::{Root, Skeleton};
 use gigalod_format::{Bounds, InputCounts, Kind, Metadata};
 use gigalod_import::ModelStream;
@@ -99,7 +100,14 @@ pub fn build(
                 Stage::Leaves(Facts { counts, origin, bounds, closed, has_colors }, leaves)
             }
             Stage::Leaves(facts, leaves) => {
-                let chunks = workers.install(|| divide::divide(leaves, facts.has_colors, &plan, &phases))?;
+                Stage::Dividing(facts, Division::new(leaves, &plan).map_err(BuildError::Scratch)?)
+            }
+            Stage::Dividing(facts, division) => {
+                let save = |division: &Division| match &work {
+                    Some(work) => checkpoint::save_division(work, &facts, division),
+                    None => Ok(()),
+                };
+                let chunks = workers.install(|| divide::divide(division, facts.has_colors, &plan, &phases, save))?;
                 Stage::Tree(facts, chunks)
             }
             Stage::Tree(facts, mut chunks) => {

@@ -108,8 +108,8 @@ fn subtree(leaves: &mut [Leaf], extent: Extent, nodes: &mut [Binary]) -> Costs {
 /// The box around centres of leaves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
-    min: Vec3,
-    max: Vec3,
+    pub(super) min: Vec3,
+    pub(super) max: Vec3,
 }
 
 impl Extent {

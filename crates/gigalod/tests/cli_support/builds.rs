@@ -49,13 +49,16 @@ impl Place {
         assert_eq!(names_in(&self.work), expected);
     }
 
-    /// Waits until so many phases are finished, and ends the process as nobody can prevent.
-    pub(crate) fn kill_after(&self, child: &mut Child, phases: usize) -> Option<String> {
-        let order = ["read", "leaves", "tree", "quantise"];
+    /// Waits until so many phases are finished, and some more, and ends the process as nobody can prevent. Returns the phase
+    /// that was the last to be finished.
+    pub(crate) fn kill_after(&self, child: &mut Child, phases: usize, more: Duration) -> Option<String> {
+        let order = ["read", "leaves", "part of tree", "tree", "quantise"];
         let has_come = |phase: &String| order.iter().position(|name| name == phase).unwrap() + 1 >= phases;
-        while child.try_wait().unwrap().is_none() && !self.journaled().as_ref().is_some_and(has_come) {
+        let is_early = || phases > 0 && !self.journaled().as_ref().is_some_and(has_come);
+        while child.try_wait().unwrap().is_none() && is_early() {
             std::thread::sleep(Duration::from_millis(1));
         }
+        std::thread::sleep(more);
         child.kill().unwrap();
         child.wait().unwrap();
         self.journaled()
