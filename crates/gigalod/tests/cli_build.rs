@@ -282,7 +282,8 @@ fn an_input_that_changes_while_it_is_read_is_refused_for_that() {
     let (ply, out) = (folder.path().join("a.ply"), folder.path().join("a.glod"));
     // Text is read slowly.
     let scan = cli_support::strips(700);
-    let changes: [(&str, fn(&File, u64)); 3] = [
+    type Change = fn(&File, u64);
+    let changes: [(&str, Change); 3] = [
         ("longer", |file, bytes| file.set_len(bytes + 1).unwrap()),
         ("shorter", |file, bytes| file.set_len(bytes - 7).unwrap()),
         ("no longer", |file, _| file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap()),

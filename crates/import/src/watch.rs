@@ -19,7 +19,7 @@ pub struct Stamp {
 /// Asks for the stamp as it is now.
 pub type AskStamp = Box<dyn FnMut() -> io::Result<Stamp> + Send>;
 
-/// As [`open`], for a source that others might write to.
+/// As [`open()`], for a source that others might write to.
 ///
 /// # Errors
 /// As there; and from the stream, that the source has changed.
