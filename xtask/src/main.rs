@@ -20,7 +20,7 @@ cargo xtask COMMAND
   test          everything CI runs: format, lints, documentation, tests, shaders, web build
   bench [--large]  measure against the targets, write docs/benchmarks.md (about 5 minutes; with 100 M triangles 10)
   soak [--triangles N] [--largest]  what takes too long for `test`: 50 kills of a build of 5 million triangles; memory, disk
-                and verify of 100 million (or N), written to docs/soak.md; with 372 million as well, which needs 30 GB of disk
+                and verify of 100 million (or N ≥ 10 million), written to docs/soak.md; with 372 million as well, which needs 30 GB of disk
   setup         install what demo and test need (they do it by themselves)
 
 Environment of `test` and `bench`:

@@ -13,10 +13,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::process::Stdio;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 const MIB: f64 = (1 << 20) as f64;
 const KILLS: usize = 50;
+/// As journals name them, in order.
+const PHASES: [&str; 5] = ["read", "leaves", "part of tree", "tree", "quantise"];
 
 /// What a statue takes on disk for each triangle: 19 bytes of scan, at most three times that of temporary files, and 2 of splats.
 const BYTES_PER_TRIANGLE: u64 = 19 * 4 + 2;
@@ -35,10 +37,10 @@ pub(crate) fn soak(arguments: &[String]) -> Result<()> {
             _ => bail!(USAGE),
         }
     }
-    ensure!(triangles >= 1_000_000, "{triangles} triangles, expected at least 1000000: fewer fit into memory");
+    ensure!(triangles >= 10_000_000, "{triangles} triangles, expected at least 10000000: fewer fit into memory");
     let soak = Soak(Program::build("soak")?);
     let mut rows = Vec::new();
-    soak.kills(triangles.min(5_000_000), &mut rows)?;
+    soak.kills(5_000_000, &mut rows)?;
     soak.out_of_core("statue.ply", triangles, "512MiB", &mut rows)?;
     if largest {
         soak.out_of_core("largest.ply", 372_000_000, "2GiB", &mut rows)?;
@@ -81,9 +83,13 @@ impl Soak {
             let mut build =
                 self.0.command(&["build", "killed.ply", "-o", "killed.glod", "--memory", "64MiB", "--resume"]);
             let mut build = build.stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
-            // Of a build that goes on less is left than of one that begins.
-            let share = random.next() * if work.exists() { 0.5 } else { 1.0 };
-            std::thread::sleep(took.mul_f64(share));
+            // From the first phase to the last, at any moment of it.
+            let phases = kills * (PHASES.len() + 1) / KILLS;
+            let is_early = || phases > 0 && PHASES.iter().position(|name| *name == phase(&work)) < Some(phases - 1);
+            while build.try_wait()?.is_none() && is_early() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(took.mul_f64(random.next() / PHASES.len() as f64));
             build.kill()?;
             let finished = build.wait()?.success();
             if !finished {

@@ -3,7 +3,7 @@
 
 mod cli_support;
 
-use cli_support::builds::{Place, interrupted};
+use cli_support::builds::{PHASES, Place, TRIES, interrupted};
 use cli_support::{Ran, command, folder, names_in};
 use serde_json::Value;
 use std::fs::File;
@@ -50,8 +50,8 @@ fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
     while kills < 10 {
         let mut child = place.spawn(&big.ply, &["--resume"]);
         // From the first phase to the last, at any moment of it.
-        let phases = kills * 6 / 10;
-        let last = place.kill_after(&mut child, phases, big.took.mul_f64(random() / 6.0));
+        let phases = kills * (PHASES.len() + 1) / 10;
+        let last = place.kill_after(&mut child, phases, big.took.mul_f64(random() / PHASES.len() as f64));
         if child.wait().unwrap().success() {
             // It was done before its time: once more from the beginning.
             place.expect_done(&big.glod);
@@ -91,7 +91,7 @@ fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now(
             let mut child = place.spawn(&big.ply, &["--threads", "2"]);
             place.kill_after(&mut child, phases, Duration::ZERO)
         });
-        let phase = phase.flatten().next().unwrap();
+        let phase = phase.take(TRIES).flatten().next().expect("large enough to be killed in time");
         println!("goes on after {phase}");
         let ran = run!["build", big.ply, "-o", place.out, "--resume", "--json", options[0], options[1]].done();
         assert_eq!(ran.stderr, "", "nothing to note");

@@ -7,6 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+/// Phases that can be gone on after, as journals name them, in order.
+pub(crate) const PHASES: [&str; 5] = ["read", "leaves", "part of tree", "tree", "quantise"];
+
+/// So often a build is begun anew that was over before it could be killed: then the machine is too fast for that.
+pub(crate) const TRIES: usize = 100;
+
 /// An output in a folder of its own.
 pub(crate) struct Place {
     pub(crate) folder: tempfile::TempDir,
@@ -52,11 +58,13 @@ impl Place {
     /// Waits until so many phases are finished, and some more, and ends the process as nobody can prevent. Returns the phase
     /// that was the last to be finished.
     pub(crate) fn kill_after(&self, child: &mut Child, phases: usize, more: Duration) -> Option<String> {
-        let order = ["read", "leaves", "part of tree", "tree", "quantise"];
-        let has_come = |phase: &String| order.iter().position(|name| name == phase).unwrap() + 1 >= phases;
+        let has_come = |phase: &String| {
+            let number = PHASES.iter().position(|name| name == phase);
+            number.expect("journals name the phases that tests know") + 1 >= phases
+        };
         let is_early = || phases > 0 && !self.journaled().as_ref().is_some_and(has_come);
         while child.try_wait().unwrap().is_none() && is_early() {
-            std::thread::sleep(Duration::from_millis(1));
+            std::thread::yield_now();
         }
         std::thread::sleep(more);
         child.kill().unwrap();
