@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 const MIB: f64 = (1 << 20) as f64;
 const KILLS: usize = 50;
 /// As journals name them, in order.
-const PHASES: [&str; 5] = ["read", "leaves", "part of tree", "tree", "quantise"];
+const PHASES: [&str; 4] = ["read", "leaves", "part of tree", "tree"];
 
 /// What a statue takes on disk for each triangle: 19 bytes of scan, at most three times that of temporary files, and 2 of splats.
 const BYTES_PER_TRIANGLE: u64 = 19 * 4 + 2;

@@ -103,6 +103,11 @@ impl Work {
         File::options().read(true).write(true).create(true).truncate(true).open(self.path_of(name))
     }
 
+    /// True where the journal names a spool.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.found.as_ref().is_some_and(|journal| journal.spools.contains_key(name))
+    }
+
     /// Opens the file of a spool that the journal names.
     pub(crate) fn reopen(&self, name: &str, record_bytes: u64) -> io::Result<(File, u64)> {
         let extent = self.found.as_ref().and_then(|journal| journal.spools.get(name));

@@ -19,6 +19,32 @@ impl Sphere {
         reach >= 0.0 && (self.center.as_dvec3() - inner.center.as_dvec3()).length_squared() <= reach * reach
     }
 
+    /// True when what `a` and `b` have in common lies inside this ball. Decided in `f64`; where rounding could matter, false.
+    pub fn encloses_common(&self, a: &Sphere, b: &Sphere) -> bool {
+        let at = self.center.as_dvec3();
+        let ball = |ball: &Sphere| (ball.center.as_dvec3() - at, f64::from(ball.radius));
+        let ((ca, ra), (cb, rb)) = (ball(a), ball(b));
+        // The farthest point of one ball, seen from this one's centre, if the other holds it; else a point where both meet.
+        let farthest = |c: DVec3, r: f64| c + c.normalize_or(DVec3::X) * r;
+        let (far_a, far_b) = (farthest(ca, ra), farthest(cb, rb));
+        let reach = if (far_a - cb).length_squared() <= rb * rb {
+            far_a.length()
+        } else if (far_b - ca).length_squared() <= ra * ra {
+            far_b.length()
+        } else {
+            let between = cb - ca;
+            let apart = between.length();
+            let axis = between / apart;
+            let along = (apart * apart + ra * ra - rb * rb) / (2.0 * apart);
+            let ring = (ra * ra - along * along).max(0.0).sqrt();
+            let middle = ca + axis * along;
+            let height = middle.dot(axis);
+            let out = (middle - axis * height).length() + ring;
+            (height * height + out * out).sqrt()
+        };
+        reach <= f64::from(self.radius) * (1.0 - 1e-9)
+    }
+
     /// The smallest ball around both, rounded outwards: it [`encloses`](Self::encloses) both.
     pub fn around(a: &Sphere, b: &Sphere) -> Sphere {
         let (ca, cb) = (a.center.as_dvec3(), b.center.as_dvec3());
@@ -84,6 +110,26 @@ mod tests {
             let apart = (a.center.as_dvec3() - b.center.as_dvec3()).length();
             let least = ((apart + f64::from(a.radius) + f64::from(b.radius)) * 0.5).max(f64::from(a.radius.max(b.radius)));
             prop_assert!(f64::from(ball.radius) <= least + 1e-3);
+        }
+
+        #[test]
+        fn what_two_balls_have_in_common_is_enclosed(
+            a in spheres(), towards in prop::array::uniform3(-1f32..1.0), apart in 0f32..1.2, ratio in 0.3f32..1.5,
+            at in prop::array::uniform3(-1f32..1.0), size in 0.2f32..1.5, point in prop::array::uniform3(-1f64..1.0),
+        ) {
+            let b = Sphere {
+                center: a.center + Vec3::from_array(towards).normalize_or_zero() * a.radius * apart,
+                radius: a.radius * ratio,
+            };
+            let ball = Sphere { center: a.center + Vec3::from_array(at) * a.radius * 0.5, radius: a.radius * size };
+            let point = a.center.as_dvec3() + DVec3::from_array(point) * f64::from(a.radius);
+            let holds = |ball: &Sphere| (point - ball.center.as_dvec3()).length() <= f64::from(ball.radius);
+            if ball.encloses_common(&a, &b) && holds(&a) && holds(&b) {
+                prop_assert!(holds(&ball));
+            }
+            // Whoever encloses one of them encloses what they have in common.
+            let wide = Sphere { radius: (a.center.distance(ball.center) + a.radius) * 1.001, ..ball };
+            prop_assert!(a.radius == 0.0 || wide.encloses_common(&a, &b));
         }
 
         #[test]

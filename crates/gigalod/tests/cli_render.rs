@@ -245,7 +245,9 @@ fn a_damaged_page_is_named_and_drawn_coarser() {
         assert_eq!(ran.stderr, format!("warning: {problem}\n"));
         assert_eq!((&report["limited_by"], &report["converged"]), (&"residency".into(), &false.into()), "{part:?}");
         assert!(report["drawn"]["nodes"].as_u64() < good["drawn"]["nodes"].as_u64(), "{part:?}");
-        assert!(report["max_error_px"].as_f64() > good["max_error_px"].as_f64(), "{part:?}");
+        // The last page refines the smallest spheres: not those with the largest error.
+        let (error, whole) = (report["max_error_px"].as_f64(), good["max_error_px"].as_f64());
+        assert!(if matches!(part, Part::FirstPage) { error > whole } else { error >= whole }, "{part:?}");
         assert_eq!(read_png(&easel.path("a.png")).0, 160);
     }
     // Only the metadata: nothing of it is needed for a picture.
@@ -303,6 +305,7 @@ fn too_small_a_budget_is_kept_and_said() {
     let report = easel.report(model, &format!("--cpu-budget {budget}"));
     assert!(report["cpu_bytes"].as_u64().unwrap() <= budget, "{report}");
     assert_eq!((&report["converged"], &report["limited_by"]), (&false.into(), &"residency".into()));
-    assert!(report["max_error_px"].as_f64() > whole["max_error_px"].as_f64());
-    assert!(report["drawn"]["nodes"].as_u64() > Some(0), "coarser, but all of it");
+    assert!(report["max_error_px"].as_f64() >= whole["max_error_px"].as_f64());
+    let (drawn, all) = (report["drawn"]["nodes"].as_u64(), whole["drawn"]["nodes"].as_u64());
+    assert!(drawn > Some(0) && drawn < all, "coarser, but all of it");
 }

@@ -77,14 +77,8 @@ fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
 #[test]
 fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now() {
     let big = big();
-    let others = [
-        ["--memory", "64MiB"],
-        ["--memory", "4GiB"],
-        ["--memory", "256MiB"],
-        ["--threads", "1"],
-        ["--memory", "100MiB"],
-    ];
-    for (phases, options) in (1..).zip(others) {
+    let others = [["--memory", "64MiB"], ["--memory", "4GiB"], ["--memory", "256MiB"], ["--threads", "1"]];
+    for (phases, options) in (1..=PHASES.len()).zip(others) {
         let place = Place::new();
         // Where the machine is so busy that the build was over before it could be killed: once more.
         let phase = std::iter::repeat_with(|| {

@@ -172,6 +172,47 @@ fn bytes_do_not_depend_on_the_memory() {
     }
 }
 
+/// The same mesh, its vertices and triangles in no order.
+fn shuffled(mesh: FromMemory) -> FromMemory {
+    // A step without a common factor visits all.
+    let visit = |count: usize| (0..count).map(move |i| (i * 1_000_003 + 17) % count);
+    let order: Vec<usize> = visit(mesh.positions.len()).collect();
+    let mut rank = vec![0; order.len()];
+    for (place, vertex) in order.iter().enumerate() {
+        rank[*vertex] = place as u32;
+    }
+    let triangle = |at: usize| mesh.triangles[at].map(|vertex| rank[vertex as usize]);
+    FromMemory {
+        positions: order.iter().map(|vertex| mesh.positions[*vertex]).collect(),
+        colors: order.iter().map(|vertex| mesh.colors[*vertex]).collect(),
+        triangles: visit(mesh.triangles.len()).map(triangle).collect(),
+        sent: 0,
+    }
+}
+
+#[test]
+fn bytes_do_not_depend_on_the_order_of_the_input() {
+    let folder = tempfile::tempdir().unwrap();
+    // With coordinates that `f32` has, and without; in memory, where a mesh in no order is sorted, and in files.
+    for scale in [0.5, 0.1] {
+        let mesh = || {
+            let mut mesh = wavy_grid(300);
+            for position in &mut mesh.positions {
+                *position = (position.as_vec3() * scale as f32).as_dvec3() + DVec3::splat(scale - 0.5);
+            }
+            mesh
+        };
+        let bytes = |mesh: FromMemory, memory_bytes: u64| {
+            let out = folder.path().join("out.glod");
+            build(mesh, &Options { memory_bytes, ..Options::default() }, &out).unwrap();
+            std::fs::read(&out).unwrap()
+        };
+        let in_order = bytes(mesh(), 2 << 30);
+        assert!(bytes(shuffled(mesh()), 2 << 30) == in_order, "in memory, {scale}");
+        assert!(bytes(shuffled(mesh()), 4 << 20) == in_order, "in files, {scale}");
+    }
+}
+
 #[test]
 fn a_crowd_that_no_plane_can_separate_needs_memory_and_says_so() {
     let folder = tempfile::tempdir().unwrap();

@@ -65,19 +65,19 @@ fn leaves_below(file: &SplatFile) -> BTreeMap<Place, Vec<Place>> {
         let page = &pages[group.0.0 as usize];
         let start = usize::from(group.1.0);
         let mut below_all = Vec::new();
-        let mut family = page.words().get(start + usize::from(count)).map(|word| page.family(*word));
+        let family = page.words().get(start + usize::from(count)).map(|word| page.family(*word));
+        let mut before = 0;
         for at in start..start + usize::from(count) {
             let place = (group.0, WordIndex(at as u16));
             let children = gigalod_format::splats::Node(page.words()[at]).children();
             let below = if children.count == 0 {
                 vec![place]
             } else {
-                let start = family.expect("inner nodes have a pointer");
-                family = Some(gigalod_format::splats::page::FamilyStart {
-                    page: start.page,
-                    word: WordIndex(start.word.0 + children.words() as u16),
-                });
-                walk(pages, (start.page, start.word), children.count, out)
+                let family = family.expect("inner nodes have a pointer");
+                let first = pages[family.page.0 as usize].family_word(family.family).expect("the family is there");
+                let start = WordIndex(first.0 + before);
+                before += children.words() as u16;
+                walk(pages, (family.page, start), children.count, out)
             };
             below_all.extend(&below);
             out.insert(place, below);

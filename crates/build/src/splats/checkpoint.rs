@@ -3,19 +3,18 @@
 //! In: a [`Stage`]. Out: the same stage, in another process. What grows with the model is in spools, which are named for it;
 //! of the rest, lists become spools too, and single facts stand in the journal.
 
-use super::contract::Plan;
+use super::chunk::Head;
 use super::divide::{Chunks, Division};
+use super::kept::KeptTree;
 use super::leaves::Leaf;
-use super::mesh::Mesh;
-use super::quantise::Quantised;
-use super::tree::{Binary, Extent};
+use super::mesh::{Mesh, Positions};
+use super::tree::Extent;
 use crate::spool::{Place, Spool};
 use crate::work::Work;
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
 use gigalod_format::InputCounts;
-use gigalod_format::splats::Node;
-use gigalod_geom::{Aabb, Sphere};
-use glam::{DVec3, Vec3};
+use gigalod_geom::Aabb;
+use glam::{DVec3, Vec3A};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::io;
@@ -30,7 +29,6 @@ pub(super) enum Stage {
     Leaves(Facts, Spool<Leaf>),
     Dividing(Facts, Division),
     Tree(Facts, Chunks),
-    Quantised(Facts, Quantised, Spool<u16>),
 }
 
 /// What is known of the model as a whole.
@@ -41,22 +39,6 @@ pub(super) struct Facts {
     pub(super) bounds: Aabb,
     pub(super) closed: bool,
     pub(super) has_colors: bool,
-}
-
-/// A node of the tree on top, as a record.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct TopNode {
-    center: [f32; 3],
-    radius: f32,
-    mean_normal: [f32; 3],
-    mean_color: [f32; 3],
-    units: u32,
-    weight: u32,
-    normal: u16,
-    code: u16,
-    cone: u8,
-    plan: [u8; 3],
 }
 
 /// Keeps what `stage` has, instead of all that the one before it had.
@@ -72,21 +54,13 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
         // Was saved when it was made.
         Stage::Dividing(..) => Ok(()),
         Stage::Tree(facts, Chunks { kept, colors, sizes, top }) => {
-            let lists = [list(&place, "chunk_sizes", sizes)?, list(&place, "top", &records(top))?];
-            work.finish("tree", [kept.secure()?, colors.secure()?].into_iter().chain(lists), facts.to_json())
-        }
-        Stage::Quantised(facts, Quantised { top, top_nodes, nodes, levels, overhang }, colors) => {
-            let counts: Vec<u32> = levels.iter().map(|levels| levels.len() as u32).collect();
-            let levels: Vec<[u32; 2]> = levels.iter().flatten().map(|(count, r)| [*count, r.to_bits()]).collect();
             let lists = [
-                list(&place, "top_quantised", &records(top))?,
-                list(&place, "top_nodes", &top_nodes.iter().map(|node| node.0).collect::<Vec<u32>>())?,
-                list(&place, "level_counts", &counts)?,
-                list(&place, "levels", &levels)?,
+                list(&place, "chunk_sizes", sizes)?,
+                list(&place, "top", &top.nodes)?,
+                list(&place, "top_colors", &top.colors)?,
+                list(&place, "chunk_roots", &top.unit_nodes)?,
             ];
-            let mut state = facts.to_json();
-            state["overhang"] = overhang.to_bits().into();
-            work.finish("quantise", [nodes.secure()?, colors.secure()?].into_iter().chain(lists), state)
+            work.finish("tree", [kept.secure()?, colors.secure()?].into_iter().chain(lists), facts.to_json())
         }
     }
 }
@@ -104,7 +78,7 @@ pub(super) fn save_division(work: &Work, facts: &Facts, division: &Division) -> 
         colors.secure()?,
         list(&place, &of("sizes"), sizes)?,
         list(&place, &of("shape"), &shape)?,
-        list(&place, &of("roots"), &records(&division.roots))?,
+        list(&place, &of("roots"), &division.roots)?,
         list(&place, &of("extents"), &extents)?,
     ];
     let pending = division.pending.iter().map(|(leaves, _)| leaves.secure()).collect::<io::Result<Vec<_>>>()?;
@@ -124,7 +98,7 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
     let facts = || Facts::of_json(&journal.state).ok_or_else(odd);
     let stage = match journal.phase.as_str() {
         "read" => Stage::Read(Mesh {
-            positions: Spool::reopen(work, "positions")?,
+            positions: Positions::reopen(work)?,
             normals: Spool::reopen(work, "normals")?,
             colors: Spool::reopen(work, "colors")?,
             triangles: Spool::reopen(work, "triangles")?,
@@ -136,7 +110,7 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
             let of = |what: &str| format!("{what}{}-{}", numbers[0], numbers[1]);
             let extents: Vec<[[f32; 3]; 2]> = unlist(work, &of("extents"))?;
             let pending = std::iter::zip(names, extents).map(|(name, [min, max])| {
-                let extent = Extent { min: Vec3::from_array(min), max: Vec3::from_array(max) };
+                let extent = Extent { min: Vec3A::from_array(min), max: Vec3A::from_array(max) };
                 Ok((Spool::reopen(work, &name)?, extent))
             });
             let division = Division {
@@ -144,10 +118,10 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
                     kept: Spool::reopen(work, "kept")?,
                     colors: Spool::reopen(work, "kept_colors")?,
                     sizes: unlist(work, &of("sizes"))?,
-                    top: vec![],
+                    top: KeptTree::default(),
                 },
                 shape: unlist::<u8>(work, &of("shape"))?.iter().map(|is_chunk| *is_chunk != 0).collect(),
-                roots: nodes_of(unlist(work, &of("roots"))?),
+                roots: unlist::<Head>(work, &of("roots"))?,
                 pending: pending.collect::<io::Result<_>>()?,
                 sets: numbers[0],
                 done: numbers[1],
@@ -159,22 +133,13 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
                 kept: Spool::reopen(work, "kept")?,
                 colors: Spool::reopen(work, "kept_colors")?,
                 sizes: unlist(work, "chunk_sizes")?,
-                top: nodes_of(unlist(work, "top")?),
+                top: KeptTree {
+                    nodes: unlist(work, "top")?,
+                    colors: unlist(work, "top_colors")?,
+                    unit_nodes: unlist(work, "chunk_roots")?,
+                },
             };
             Stage::Tree(facts()?, chunks)
-        }
-        "quantise" => {
-            let counts: Vec<u32> = unlist(work, "level_counts")?;
-            let mut levels = unlist::<[u32; 2]>(work, "levels")?.into_iter().map(|[n, r]| (n, f32::from_bits(r)));
-            let overhang = journal.state["overhang"].as_u64().ok_or_else(odd)?;
-            let quantised = Quantised {
-                top: nodes_of(unlist(work, "top_quantised")?),
-                top_nodes: unlist(work, "top_nodes")?.into_iter().map(Node).collect(),
-                nodes: Spool::reopen(work, "nodes")?,
-                levels: counts.iter().map(|count| levels.by_ref().take(*count as usize).collect()).collect(),
-                overhang: f32::from_bits(overhang as u32),
-            };
-            Stage::Quantised(facts()?, quantised, Spool::reopen(work, "kept_colors")?)
         }
         _ => return Err(odd()),
     };
@@ -220,35 +185,4 @@ fn unlist<T: Pod>(work: &Work, name: &str) -> io::Result<Vec<T>> {
     let mut all = Vec::new();
     spool.read_vec(0, spool.len() as usize, &mut all)?;
     Ok(all)
-}
-
-fn records(top: &[Binary]) -> Vec<TopNode> {
-    let record = |node: &Binary| TopNode {
-        center: node.sphere.center.to_array(),
-        radius: node.sphere.radius,
-        mean_normal: node.mean_normal.to_array(),
-        mean_color: node.mean_color.to_array(),
-        units: node.units,
-        weight: node.weight,
-        normal: node.normal,
-        code: node.code,
-        cone: node.cone,
-        plan: node.plan.to_bytes(),
-    };
-    top.iter().map(record).collect()
-}
-
-fn nodes_of(records: Vec<TopNode>) -> Vec<Binary> {
-    let node = |record: TopNode| Binary {
-        sphere: Sphere { center: Vec3::from_array(record.center), radius: record.radius },
-        mean_normal: Vec3::from_array(record.mean_normal),
-        mean_color: Vec3::from_array(record.mean_color),
-        units: record.units,
-        weight: record.weight,
-        normal: record.normal,
-        code: record.code,
-        cone: record.cone,
-        plan: Plan::of_bytes(record.plan),
-    };
-    records.into_iter().map(node).collect()
 }

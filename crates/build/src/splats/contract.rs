@@ -6,7 +6,6 @@
 //! more even split.
 
 use super::tree::Binary;
-use gigalod_geom::quantise::{cone, normal};
 
 /// Least numbers of inner nodes of a subtree, as 1, 2 and 3 siblings.
 #[derive(Clone, Copy, Debug)]
@@ -26,14 +25,6 @@ pub(super) struct Plan {
 impl Plan {
     /// Of a unit.
     pub(super) const NONE: Self = Self { children: 0, left_of_3: 0, left_of_4: 0 };
-
-    pub(super) fn to_bytes(self) -> [u8; 3] {
-        [self.children, self.left_of_3, self.left_of_4]
-    }
-
-    pub(super) fn of_bytes([children, left_of_3, left_of_4]: [u8; 3]) -> Self {
-        Self { children, left_of_3, left_of_4 }
-    }
 }
 
 /// No subtree of fewer leaves can be so many siblings. Small enough to add without overflow.
@@ -105,49 +96,5 @@ impl ChildList {
 
     pub(super) fn as_slice(&self) -> &[u32] {
         &self.indices[..usize::from(self.count)]
-    }
-}
-
-/// Gives each kept inner node the narrowest cone that holds its children's cones as stored.
-pub(super) fn set_cones(nodes: &mut [Binary]) {
-    // Backwards through preorder: children before parents. Nodes that are not kept get a cone too; nobody reads it.
-    for index in (0..nodes.len()).rev() {
-        if nodes[index].units == 1 {
-            continue;
-        }
-        let axis = normal::decode(nodes[index].normal);
-        let mut cos_widest = 1.0_f32;
-        for child in ChildList::of(nodes, index).as_slice() {
-            let child = &nodes[*child as usize];
-            cos_widest = cos_widest.min(cos_of_sum(axis.dot(normal::decode(child.normal)), cone::cosine(child.cone)));
-        }
-        nodes[index].cone = cone::encode(cos_widest);
-    }
-}
-
-/// cos(α + β) from the cosines of α in [0°, 180°] and β in [0°, 90°) ∪ {180°}; −1 where the sum passes 180°.
-fn cos_of_sum(cos_a: f32, cos_b: f32) -> f32 {
-    // cos β ≥ −cos α ⇔ α + β ≤ 180°.
-    if cos_b < 0.0 || cos_a < -cos_b {
-        return -1.0;
-    }
-    let sin = |cos: f32| (1.0 - cos * cos).max(0.0).sqrt();
-    cos_a * cos_b - sin(cos_a) * sin(cos_b)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cosines_of_sums_are_those_of_the_angles() {
-        for a in 0..=180 {
-            for b in (0..90).chain([180]) {
-                let (a, b) = (f64::from(a).to_radians(), f64::from(b).to_radians());
-                let expected = (a + b).min(std::f64::consts::PI).cos() as f32;
-                let found = cos_of_sum(a.cos() as f32, b.cos() as f32);
-                assert!((found - expected).abs() < 1e-3, "{a} {b}: {found} {expected}");
-            }
-        }
     }
 }

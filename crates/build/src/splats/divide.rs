@@ -3,26 +3,30 @@
 //! Sets of leaves are split at the midpoint of the longest axis, on disk as long as they do not fit into memory, until they are
 //! chunks. What the splits leave is a binary tree whose units are the chunks.
 
-use super::chunk::{self, Kept, MAX_LEAVES, Raised};
-use super::contract::{self, Costs};
+use super::chunk::{self, Head, MAX_LEAVES, Raised};
+use super::contract::Costs;
+use super::kept::{self, Kept, KeptTree, UnitSource};
 use super::leaves::Leaf;
+use super::measure::{Sums, Units};
 use super::plan::MemoryPlan;
-use super::tree::{self, Binary, Extent};
+use super::tree::{self, Binary, Extent, Point, Points};
 use crate::BuildError;
 use crate::progress::Phases;
 use crate::spool::Spool;
+use gigalod_geom::quantise::normal;
+use std::cell::Cell;
 use std::io;
 
 /// All chunks on the way up.
 pub(super) struct Chunks {
-    /// Kept nodes of all chunks, one after the other, in the order of the tree.
+    /// Nodes of all chunks, one chunk after the other in the order of the tree, each family by family.
     pub(super) kept: Spool<Kept>,
     /// 5-6-5, for each kept node, or empty.
     pub(super) colors: Spool<u16>,
     /// Number of kept nodes of each chunk.
     pub(super) sizes: Vec<u32>,
-    /// The tree on top: preorder; its units are the chunks.
-    pub(super) top: Vec<Binary>,
+    /// The tree on top of them; lists the chunks' roots and the roots' children too.
+    pub(super) top: KeptTree,
 }
 
 /// Chunks that are raised, and leaves that are still to be: a place in the work that one can go on from.
@@ -32,7 +36,7 @@ pub(super) struct Division {
     /// Preorder of the tree on top: true for a chunk.
     pub(super) shape: Vec<bool>,
     /// One for each chunk.
-    pub(super) roots: Vec<Binary>,
+    pub(super) roots: Vec<Head>,
     /// Sets of leaves to come, the next one last.
     pub(super) pending: Vec<(Spool<Leaf>, Extent)>,
     /// Leaves of finished chunks.
@@ -49,14 +53,14 @@ impl Division {
     pub(super) fn new(leaves: Spool<Leaf>, plan: &MemoryPlan<'_>) -> io::Result<Self> {
         let mut extent = Extent::EMPTY;
         leaves.for_each_piece(MemoryPlan::PIECE, |_, piece| {
-            extent = piece.iter().fold(extent, Extent::including);
+            extent = piece.iter().fold(extent, |extent, leaf| extent.including(leaf.center));
             Ok(())
         })?;
         let chunks = Chunks {
             kept: Spool::named(&plan.place(), "kept")?,
             colors: Spool::named(&plan.place(), "kept_colors")?,
             sizes: vec![],
-            top: vec![],
+            top: KeptTree::default(),
         };
         let pending = vec![(leaves, extent)];
         Ok(Self { chunks, shape: vec![], roots: vec![], pending, done: 0, sets: 0 })
@@ -84,7 +88,7 @@ pub(super) fn divide(
         }
     }
     let Division { mut chunks, shape, roots, .. } = divider.division;
-    chunks.top = top_of(&shape, roots);
+    top_of(&shape, &roots, has_colors, &mut chunks.top);
     Ok(chunks)
 }
 
@@ -100,14 +104,14 @@ impl Divider<'_> {
     fn set(&mut self, leaves: Spool<Leaf>, extent: Extent) -> Result<(), BuildError> {
         let at_once = self.plan.leaves_at_once() as u64;
         let leaves = match leaves {
-            Spool::Memory(mut all) => return self.block(&mut all, extent).map_err(BuildError::Scratch),
+            Spool::Memory(mut all) => return self.block(&mut all).map_err(BuildError::Scratch),
             file => file,
         };
         if leaves.len() <= at_once {
             let mut all = Vec::new();
             leaves.read_vec(0, leaves.len() as usize, &mut all).map_err(BuildError::Scratch)?;
             drop(leaves);
-            return self.block(&mut all, extent).map_err(BuildError::Scratch);
+            return self.block(&mut all).map_err(BuildError::Scratch);
         }
         let Some(plane) = extent.plane() else {
             return Err(BuildError::Crowd { vertices: leaves.len(), most: at_once });
@@ -115,8 +119,8 @@ impl Divider<'_> {
         let mut halves = [self.half()?, self.half()?];
         let sort = |_: u64, piece: &[Leaf]| {
             for leaf in piece {
-                let half = &mut halves[usize::from(!plane.is_left(leaf))];
-                half.extent = half.extent.including(leaf);
+                let half = &mut halves[usize::from(!plane.is_left(leaf.center))];
+                half.extent = half.extent.including(leaf.center);
                 half.waiting.push(*leaf);
             }
             halves.iter_mut().try_for_each(Half::flush)
@@ -136,25 +140,24 @@ impl Divider<'_> {
         Ok(Half { leaves, extent: Extent::EMPTY, waiting: vec![] })
     }
 
-    /// A set of leaves in memory.
-    fn block(&mut self, leaves: &mut [Leaf], extent: Extent) -> io::Result<()> {
+    /// A set of leaves in memory; so much of it at a time that finished chunks do not pile up before they are put away.
+    fn block(&mut self, leaves: &mut [Leaf]) -> io::Result<()> {
         let count = leaves.len() as u64;
-        // So much at a time that finished chunks do not pile up before they are put away.
         if leaves.len() > self.plan.leaves_at_once() {
             self.division.shape.push(false);
-            let (middle, [left_extent, right_extent]) = tree::split(leaves, extent);
+            let middle = tree::split(leaves);
             let (left, right) = leaves.split_at_mut(middle);
-            self.block(left, left_extent)?;
-            return self.block(right, right_extent);
+            self.block(left)?;
+            return self.block(right);
         }
-        let part = raise_all(leaves, extent, self.has_colors);
+        let part = raise_all(leaves, self.has_colors);
         let Division { chunks, shape, roots, done, .. } = &mut self.division;
         shape.extend(part.shape);
         for raised in part.raised {
-            chunks.kept.push(&raised.kept)?;
+            chunks.kept.push(&raised.nodes)?;
             chunks.colors.push(&raised.colors)?;
-            chunks.sizes.push(raised.kept.len() as u32);
-            roots.push(raised.root);
+            chunks.sizes.push(raised.nodes.len() as u32);
+            roots.push(raised.head);
         }
         *done += count;
         self.phases.at(*done);
@@ -182,39 +185,77 @@ struct Part {
     shape: Vec<bool>,
 }
 
-fn raise_all(leaves: &mut [Leaf], extent: Extent, has_colors: bool) -> Part {
-    if leaves.len() <= MAX_LEAVES {
-        return Part { raised: vec![chunk::raise(leaves, has_colors)], shape: vec![true] };
+/// Leaves that are split by their points; more than that where they lie, so that points need little room.
+const MOST_POINTS: usize = MAX_LEAVES * 8;
+
+thread_local! {
+    /// Kept, because the system would clear them for each set of leaves anew.
+    static POINTS: Cell<[Vec<Point>; 2]> = const { Cell::new([Vec::new(), Vec::new()]) };
+}
+
+fn raise_all(leaves: &mut [Leaf], has_colors: bool) -> Part {
+    if leaves.len() > MOST_POINTS {
+        let middle = tree::split(leaves);
+        let (left, right) = leaves.split_at_mut(middle);
+        return Part::both(|| raise_all(left, has_colors), || raise_all(right, has_colors));
     }
-    let (middle, [left_extent, right_extent]) = tree::split(leaves, extent);
-    let (left, right) = leaves.split_at_mut(middle);
-    let (left, right) =
-        rayon::join(|| raise_all(left, left_extent, has_colors), || raise_all(right, right_extent, has_colors));
-    Part {
-        raised: left.raised.into_iter().chain(right.raised).collect(),
-        shape: [false].into_iter().chain(left.shape).chain(right.shape).collect(),
+    let mut buffers = POINTS.take();
+    let part = raise_points(Points::of(leaves, &mut buffers), leaves, has_colors);
+    POINTS.set(buffers);
+    part
+}
+
+fn raise_points(points: Points<'_>, leaves: &[Leaf], has_colors: bool) -> Part {
+    if points.len() <= MAX_LEAVES {
+        return Part { raised: vec![chunk::raise(points, leaves, has_colors)], shape: vec![true] };
+    }
+    let [left, right] = points.split(leaves);
+    Part::both(|| raise_points(left, leaves, has_colors), || raise_points(right, leaves, has_colors))
+}
+
+impl Part {
+    fn both(left: impl FnOnce() -> Self + Send, right: impl FnOnce() -> Self + Send) -> Self {
+        let (mut left, mut right) = rayon::join(left, right);
+        left.raised.append(&mut right.raised);
+        let shape = [false].into_iter().chain(left.shape).chain(right.shape).collect();
+        Self { raised: left.raised, shape }
     }
 }
 
-/// The nodes of the tree on top, in preorder, merged and with their cones.
-fn top_of(shape: &[bool], roots: Vec<Binary>) -> Vec<Binary> {
+/// The tree on top of the chunks.
+fn top_of(shape: &[bool], roots: &[Head], has_colors: bool, out: &mut KeptTree) {
     // Backwards through preorder, a stack of subtrees, each with its costs; the left one is on top.
-    let mut nodes = Vec::with_capacity(shape.len());
-    let mut stack: Vec<(Binary, Costs)> = Vec::new();
-    let mut roots = roots.into_iter().rev();
+    let mut binaries = Vec::with_capacity(shape.len());
+    let mut stack: Vec<(u32, Costs)> = Vec::new();
     for is_chunk in shape.iter().rev() {
         let (node, costs) = if *is_chunk {
-            (roots.next().expect("a root for each chunk"), Costs::LEAF)
+            (Binary::UNIT, Costs::LEAF)
         } else {
             let (left, left_costs) = stack.pop().expect("an inner node has a left child");
             let (right, right_costs) = stack.pop().expect("an inner node has a right child");
             let (costs, plan) = Costs::merge(left_costs, right_costs);
-            (Binary::around(&left, &right, plan), costs)
+            (Binary { units: left + right, plan }, costs)
         };
-        nodes.push(node);
-        stack.push((node, costs));
+        binaries.push(node);
+        stack.push((node.units, costs));
     }
-    nodes.reverse();
-    contract::set_cones(&mut nodes);
-    nodes
+    binaries.reverse();
+    let mut units = Units::default();
+    for head in roots {
+        units.push(&head.sphere(), normal::decode(head.normal), head.cos_spread);
+    }
+    kept::keep(&binaries, &units, &Roots(roots), has_colors, out);
+}
+
+struct Roots<'a>(&'a [Head]);
+
+impl UnitSource for Roots<'_> {
+    fn unit(&self, at: usize) -> (Kept, Sums) {
+        let head = &self.0[at];
+        (head.root, head.sums)
+    }
+
+    fn group_below(&self, at: usize) -> (&[Kept], &[u16]) {
+        self.0[at].group()
+    }
 }

@@ -7,9 +7,11 @@
 use super::plan::MemoryPlan;
 use crate::spool::Spool;
 use bytemuck::Pod;
+use rayon::prelude::*;
 use std::io;
 
 /// The corners of a batch of triangles, in order of their vertices.
+#[derive(Default)]
 pub(super) struct Corners {
     /// Vertex in the upper half, number of the corner (3 · triangle + 0, 1, 2) in the lower. Sorted; empty while not needed.
     by_vertex: Vec<u64>,
@@ -30,10 +32,10 @@ impl Corners {
     }
 
     /// The record of each corner's vertex.
-    pub(super) fn fetch<R: Pod>(&mut self, records: &Spool<R>, out: &mut Vec<R>) -> io::Result<()> {
+    pub(super) fn fetch<R: Pod + Send + Sync>(&mut self, records: &Spool<R>, out: &mut Vec<R>) -> io::Result<()> {
         out.clear();
         if let Spool::Memory(all) = records {
-            out.extend(self.vertices.iter().map(|vertex| all[*vertex as usize]));
+            self.vertices.par_iter().with_min_len(1 << 14).map(|vertex| all[*vertex as usize]).collect_into_vec(out);
             return Ok(());
         }
         self.sort();
@@ -50,23 +52,15 @@ impl Corners {
     }
 
     /// Folds a contribution of each corner into the record of its vertex; `fold` is told the number of the corner.
-    pub(super) fn fold<R: Pod + Send>(
+    pub(super) fn fold<R: Pod>(
         &mut self,
         records: &mut Spool<R>,
-        fold: impl Fn(&mut R, usize) + Sync,
+        mut fold: impl FnMut(&mut R, usize),
     ) -> io::Result<()> {
         if let Spool::Memory(all) = records {
-            // Two halves of the vertices: each sees all corners, and takes its own, in order.
-            let middle = all.len() / 2;
-            let (low, high) = all.split_at_mut(middle);
-            let half = |records: &mut [R], first: usize| {
-                for (corner, vertex) in self.vertices.iter().enumerate() {
-                    if let Some(record) = (*vertex as usize).checked_sub(first).and_then(|at| records.get_mut(at)) {
-                        fold(record, corner);
-                    }
-                }
-            };
-            rayon::join(|| half(low, 0), || half(high, middle));
+            for (corner, vertex) in self.vertices.iter().enumerate() {
+                fold(&mut all[*vertex as usize], corner);
+            }
             return Ok(());
         }
         self.sort();

@@ -1,266 +1,266 @@
-//! Breadth-first layout: families of nodes, level by level across all chunks, packed into pages.
+//! The order of the file: all families of the coarsest bucket, those of the tree on top first, then chunk by chunk; then those of
+//! the next bucket. So a prefix of the file is the whole model down to some size of sphere.
 //!
-//! The same walk is taken twice: once to find out how many pages there are and how often each symbol occurs, once to write.
+//! [`Quantised`] trees go in; where each family lies, and then any page, come out. Families are numbered in the order of the file,
+//! so links are known before pages are: one walk over all families finds where pages end ([`Layout::of`]); after it pages are
+//! made independently, side by side ([`Layout::page`]).
 
-use super::chunk::packed_color;
-use super::contract::ChildList;
-use super::pager::Pager;
+use super::lower::{Family, Link, Run};
 use super::quantise::Quantised;
-use crate::progress::Phases;
-use crate::spool::Spool;
-use gigalod_format::splats::codec::{self, Model, Statistics};
-use gigalod_format::splats::page::{CODEC_ENTROPY, CODEC_RAW};
-use gigalod_format::splats::{Node, PageContents, PageRecord, Skeleton};
-use gigalod_format::{Kind, LevelSummary, Writer};
-use rayon::prelude::*;
-use std::fs::File;
-use std::io::{self, BufWriter};
+use gigalod_format::splats::page::{CODEC_RAW, MAX_NODES};
+use gigalod_format::splats::{FamilyPlace, Linker, Node, PageContents, PageId, PageRecord};
+use std::io;
 
-pub(super) struct Written<'a> {
-    pub(super) writer: Writer<BufWriter<&'a File>>,
-    pub(super) pages: Vec<PageRecord>,
-    pub(super) model: Option<Model>,
-    pub(super) nodes: u64,
-    pub(super) leaves: u64,
-    pub(super) levels: Vec<LevelSummary>,
-    /// All pages before entropy coding, and for each pointer the 16 bits of an offset from its page's first family, although
-    /// the file leaves pointers out.
-    pub(super) raw_bytes: u64,
+/// A run of families, and where it begins: in the file, and in its tree.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    /// A chunk, or `None` for the tree on top.
+    chunk: Option<u32>,
+    run: Run,
+    number: u64,
+    first_family: u32,
+    first_node: u32,
+    first_link: u32,
 }
 
-/// Pages that are coded side by side.
-const PAGES_AT_ONCE: usize = 32;
-
-/// Writes all pages.
-pub(super) fn write<'a>(
-    quantised: &Quantised,
-    colors: &Spool<u16>,
-    file: &'a File,
-    phases: &Phases<'_>,
-) -> io::Result<Written<'a>> {
-    let tree = Tree::of(quantised, colors);
-    phases.begin("count", tree.node_count());
-    let mut statistics = Statistics::default();
-    let mut raw_bytes = 0;
-    let pager = tree.walk(phases, |pages| {
-        let counted = pages
-            .par_iter()
-            .fold(Statistics::default, |mut statistics, page| {
-                codec::count(page, &mut statistics);
-                statistics
-            })
-            .reduce(Statistics::default, |mut sum, statistics| {
-                sum.add(&statistics);
-                sum
-            });
-        statistics.add(&counted);
-        raw_bytes += pages.iter().map(|page| page.raw_bytes() as u64).sum::<u64>();
-        Ok(())
-    })?;
-    let model = Model::of(&statistics);
-    // A small file's model may cost more than it saves.
-    let model = (raw_bytes > 4 * model.to_bytes().len() as u64).then_some(model);
-    let (mut records, mut levels) = (pager.records(), pager.levels);
-    let pointers: u64 = records.iter().map(|page| u64::from(page.words - page.nodes)).sum();
-
-    phases.begin("write", tree.node_count());
-    let skeleton_bytes = Skeleton::encoded_bytes(records.len() as u64, model.as_ref());
-    let mut writer = Writer::new(BufWriter::with_capacity(1 << 20, file), Kind::Splats, skeleton_bytes)?;
-    let mut number = 0;
-    tree.walk(phases, |pages| {
-        let coded: Vec<(u8, Vec<u8>)> = pages.par_iter().map(|page| code(page, model.as_ref())).collect();
-        for (codec, bytes) in coded {
-            let record: &mut PageRecord = &mut records[number];
-            record.bytes = bytes.len() as u32;
-            record.checksum = gigalod_format::checksum(&bytes);
-            record.codec = codec;
-            for (level, count) in &pager.nodes_of_levels[number] {
-                levels[*level].bytes += bytes.len() as u64 * count / u64::from(record.nodes);
-            }
-            writer.page(&bytes)?;
-            number += 1;
-        }
-        Ok(())
-    })?;
-    let (nodes, leaves) = (pager.nodes, pager.leaves);
-    Ok(Written { writer, pages: records, model, nodes, leaves, levels, raw_bytes: raw_bytes + pointers * 2 })
+/// Where a page begins: in which stretch, how far into its tree, and at which number of the file.
+#[derive(Clone, Copy, Debug)]
+struct PageStart {
+    stretch: u32,
+    family: u32,
+    node: u32,
+    link: u32,
+    number: u64,
 }
 
-/// A page by the codec that makes it smaller.
-fn code(page: &PageContents, model: Option<&Model>) -> (u8, Vec<u8>) {
-    let coded = model.map(|model| codec::encode(page, model)).filter(|bytes| bytes.len() < page.raw_bytes());
-    coded.map_or_else(|| (CODEC_RAW, page.encode()), |bytes| (CODEC_ENTROPY, bytes))
-}
-
-/// All nodes, to be walked level by level.
-struct Tree<'a> {
+/// Where everything lies.
+pub(super) struct Layout<'a> {
     quantised: &'a Quantised,
-    colors: &'a Spool<u16>,
-    /// Where each chunk's nodes begin.
-    starts: Vec<u64>,
-    /// Which chunk a unit of the tree on top is.
-    chunk_of_unit: Vec<u32>,
+    stretches: Vec<Stretch>,
+    starts: Vec<PageStart>,
+    /// Of all pages; `bytes`, `checksum` and `codec` are still to come.
+    pub(super) records: Vec<PageRecord>,
+    /// Groups of each page.
+    pub(super) groups: Vec<u16>,
+    /// Levels that each page has nodes of, and how many.
+    pub(super) levels: Vec<Vec<(u16, u32)>>,
+    /// First number in the file of each stretch of the tree on top and of each chunk, by the first family of the tree in it.
+    numbers: Vec<Vec<(u32, u64)>>,
+    /// Where each chunk's families, nodes and links begin among those of all chunks.
+    firsts: Vec<[u64; 3]>,
 }
 
-/// Groups that stand next to each other on a level.
-#[derive(Clone, Copy)]
-enum Run {
-    /// One group of the tree on top.
-    Top(ChildList),
-    /// All groups of a level of a chunk, counted from its root: level 1 is the group of the root's children.
-    Chunk { chunk: usize, level: usize },
+/// Buffers that are used again.
+#[derive(Default)]
+struct Scratch {
+    families: Vec<Family>,
+    nodes: Vec<u32>,
+    colors: Vec<u16>,
+    links: Vec<u32>,
+    targets: Vec<u64>,
 }
 
-impl<'a> Tree<'a> {
-    fn of(quantised: &'a Quantised, colors: &'a Spool<u16>) -> Self {
-        let mut chunk_of_unit = vec![0; quantised.top.len()];
-        let units = quantised.top.iter().enumerate().filter(|(_, node)| node.units == 1);
-        for (chunk, (index, _)) in units.enumerate() {
-            chunk_of_unit[index] = chunk as u32;
+impl<'a> Layout<'a> {
+    /// Packs all families into pages.
+    pub(super) fn of(quantised: &'a Quantised) -> io::Result<Self> {
+        let mut stretches = Vec::new();
+        place_runs(None, &quantised.top.runs, &mut stretches);
+        let (mut firsts, mut first) = (Vec::with_capacity(quantised.runs.len()), [0u64; 3]);
+        for (chunk, runs) in quantised.runs.iter().enumerate() {
+            firsts.push(first);
+            let counts = place_runs(Some(chunk as u32), runs, &mut stretches);
+            first = std::array::from_fn(|which| first[which] + counts[which]);
         }
-        let mut start = 0;
-        let starts = quantised.levels.iter().map(|levels| {
-            let here = start;
-            start += levels.iter().map(|(count, _)| u64::from(*count)).sum::<u64>();
-            here
-        });
-        Self { quantised, colors, starts: starts.collect(), chunk_of_unit }
-    }
-
-    fn node_count(&self) -> u64 {
-        self.quantised.nodes.len()
-    }
-
-    /// Packs all families into pages, in order; `visit` gets the pages as they are full.
-    fn walk(&self, phases: &Phases<'_>, mut visit: impl FnMut(&[PageContents]) -> io::Result<()>) -> io::Result<Pager> {
-        let mut pager = Pager::default();
-        let mut runs = vec![Run::Top(ChildList::single(0))];
-        pager.begin_family(1);
-        self.push_top(&ChildList::single(0), 0, &mut pager);
-        for level in 1.. {
-            let mut next = Vec::new();
-            for run in &runs {
-                match *run {
-                    Run::Top(group) => self.families_below_top(&group, level, &mut pager, &mut next)?,
-                    Run::Chunk { chunk, level: inside } => {
-                        self.families_below_chunk(chunk, inside, level, &mut pager, &mut next)?;
-                    }
-                }
-                if pager.full.len() >= PAGES_AT_ONCE {
-                    visit(&pager.full)?;
-                    pager.full.clear();
-                    phases.at(pager.nodes);
-                }
-            }
-            if next.is_empty() {
-                break;
-            }
-            runs = next;
+        // Stable: the tree on top, then chunks in their order.
+        stretches.sort_by_key(|stretch| stretch.run.bucket);
+        let mut numbers = vec![Vec::new(); quantised.runs.len() + 1];
+        let mut number = 0;
+        for stretch in &mut stretches {
+            stretch.number = number;
+            numbers[stretch.chunk.map_or(0, |chunk| chunk as usize + 1)].push((stretch.first_family, number));
+            number += u64::from(stretch.run.families);
         }
-        pager.end_page();
-        visit(&pager.full)?;
-        pager.full.clear();
-        Ok(pager)
+        let mut layout = Self {
+            quantised,
+            stretches,
+            starts: vec![],
+            records: vec![],
+            groups: vec![],
+            levels: vec![],
+            numbers,
+            firsts,
+        };
+        layout.pack()?;
+        Ok(layout)
     }
 
-    /// The family on `level` that hangs from a group of the tree on top.
-    fn families_below_top(
+    /// Finds where pages end: before the family with which they would be too large, or have links to too many places.
+    fn pack(&mut self) -> io::Result<()> {
+        let mut scratch = Scratch::default();
+        let (mut linker, mut links) = (Linker::default(), Vec::new());
+        for at in 0..self.stretches.len() {
+            let stretch = self.stretches[at];
+            let (mut node, mut link) = (stretch.first_node, stretch.first_link);
+            self.read_links(&stretch, 0, stretch.run.families, stretch.run.links, stretch.first_link, &mut scratch)?;
+            let mut targets = &scratch.targets[..];
+            for (nth, family) in scratch.families.iter().enumerate() {
+                let nodes = family.nodes();
+                let below;
+                (below, targets) = targets.split_at(usize::from(family.links));
+                let has_room = self.records.last().is_some_and(|page| usize::from(page.nodes) + nodes <= MAX_NODES);
+                if !has_room || !linker.push(below.iter().copied(), &mut links) {
+                    linker.clear();
+                    links.clear();
+                    self.starts.push(PageStart {
+                        stretch: at as u32,
+                        family: stretch.first_family + nth as u32,
+                        node,
+                        link,
+                        number: stretch.number + nth as u64,
+                    });
+                    self.records.push(PageRecord {
+                        bytes: 0,
+                        checksum: 0,
+                        nodes: 0,
+                        words: 0,
+                        families: 0,
+                        codec: CODEC_RAW,
+                    });
+                    self.groups.push(0);
+                    self.levels.push(Vec::new());
+                    let begun = linker.push(below.iter().copied(), &mut links);
+                    debug_assert!(begun, "an empty page takes any family");
+                }
+                let page = self.records.len() - 1;
+                let (record, levels) = (&mut self.records[page], &mut self.levels[page]);
+                self.groups[page] += family.group_count() as u16;
+                record.nodes += nodes as u16;
+                record.words += nodes as u16 + family.links;
+                record.families += 1;
+                match levels.iter_mut().find(|(level, _)| *level == family.level) {
+                    Some((_, count)) => *count += nodes as u32,
+                    None => levels.push((family.level, nodes as u32)),
+                }
+                node += nodes as u32;
+                link += u32::from(family.links);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads families of a stretch, from its `skip`-th on, and the numbers in the file of those below them.
+    fn read_links(
         &self,
-        group: &ChildList,
-        level: usize,
-        pager: &mut Pager,
-        next: &mut Vec<Run>,
+        stretch: &Stretch,
+        skip: u32,
+        families: u32,
+        links: u32,
+        first_link: u32,
+        scratch: &mut Scratch,
     ) -> io::Result<()> {
-        let first_run = next.len();
-        let mut nodes_below = 0;
-        for index in group.as_slice() {
-            let index = *index as usize;
-            let (below, run) = if self.quantised.top[index].units == 1 {
-                let chunk = self.chunk_of_unit[index] as usize;
-                let below = self.quantised.levels[chunk].get(1).map_or(0, |(count, _)| *count as usize);
-                (below, Run::Chunk { chunk, level: 1 })
-            } else {
-                let below = ChildList::of(&self.quantised.top, index);
-                (below.as_slice().len(), Run::Top(below))
-            };
-            if below > 0 {
-                nodes_below += below;
-                next.push(run);
-            }
-        }
-        if nodes_below == 0 {
+        let (first, count) = ((stretch.first_family + skip) as usize, families as usize);
+        let (first_link, links) = (first_link as usize, links as usize);
+        scratch.targets.clear();
+        let Some(chunk) = stretch.chunk else {
+            let top = &self.quantised.top;
+            scratch.families.clear();
+            scratch.families.extend_from_slice(&top.families[first..first + count]);
+            scratch.targets.extend(top.links[first_link..first_link + links].iter().map(|link| match link {
+                Link::Own(family) => number_of(&self.numbers[0], *family),
+                Link::Chunk(chunk) => number_of(&self.numbers[*chunk as usize + 1], 0),
+            }));
             return Ok(());
-        }
-        pager.begin_family(nodes_below);
-        for run in &next[first_run..] {
-            match *run {
-                Run::Top(group) => self.push_top(&group, level, pager),
-                Run::Chunk { chunk, .. } => {
-                    let (nodes, colors) = self.level(chunk, 1)?;
-                    pager.push_group(&nodes, &colors, level, self.quantised.levels[chunk][1].1);
-                }
-            }
-        }
+        };
+        let [family_start, _, link_start] = self.firsts[chunk as usize];
+        self.quantised.families.read_vec(family_start + first as u64, count, &mut scratch.families)?;
+        self.quantised.links.read_vec(link_start + first_link as u64, links, &mut scratch.links)?;
+        let numbers = &self.numbers[chunk as usize + 1];
+        scratch.targets.extend(scratch.links.iter().map(|family| number_of(numbers, *family)));
         Ok(())
     }
 
-    /// The families on `level` that hang from the groups of a chunk's level `inside`.
-    fn families_below_chunk(
+    /// Makes a page.
+    pub(super) fn page(&self, page: PageId) -> io::Result<PageContents> {
+        let record = &self.records[page.0 as usize];
+        let mut contents = PageContents::default();
+        contents.nodes.reserve_exact(usize::from(record.nodes));
+        let (mut linker, mut scratch) = (Linker::default(), Scratch::default());
+        let mut start = self.starts[page.0 as usize];
+        let mut left = u32::from(record.families);
+        let mut links_left = u32::from(record.words - record.nodes);
+        while left > 0 {
+            let stretch = &self.stretches[start.stretch as usize];
+            let skip = start.family - stretch.first_family;
+            let families = left.min(stretch.run.families - skip);
+            let links = links_left.min(stretch.run.links - (start.link - stretch.first_link));
+            self.read_links(stretch, skip, families, links, start.link, &mut scratch)?;
+            let (mut nodes, mut targets) = (0, &scratch.targets[..]);
+            for family in &scratch.families {
+                contents.family_groups.push(family.group_count() as u8);
+                contents.group_sizes.extend(family.groups());
+                nodes += family.nodes();
+                let below;
+                (below, targets) = targets.split_at(usize::from(family.links));
+                let fits = linker.push(below.iter().copied(), &mut contents.links);
+                debug_assert!(fits, "it fitted when pages were packed");
+            }
+            self.read_nodes(stretch.chunk, start.node as usize, nodes, &mut contents, &mut scratch)?;
+            left -= families;
+            links_left -= scratch.families.iter().map(|family| u32::from(family.links)).sum::<u32>();
+            start.stretch += 1;
+            if let Some(next) = self.stretches.get(start.stretch as usize) {
+                (start.family, start.node, start.link) = (next.first_family, next.first_node, next.first_link);
+            }
+        }
+        contents.runs.extend(linker.starts().iter().map(|number| self.place(*number)));
+        Ok(contents)
+    }
+
+    fn read_nodes(
         &self,
-        chunk: usize,
-        inside: usize,
-        level: usize,
-        pager: &mut Pager,
-        next: &mut Vec<Run>,
+        chunk: Option<u32>,
+        first: usize,
+        count: usize,
+        contents: &mut PageContents,
+        scratch: &mut Scratch,
     ) -> io::Result<()> {
-        let Some((_, radius)) = self.quantised.levels[chunk].get(inside + 1) else { return Ok(()) };
-        let (above, _) = self.level(chunk, inside - 1)?;
-        let (groups, _) = self.level(chunk, inside)?;
-        let (below, colors) = self.level(chunk, inside + 1)?;
-        let count = |node: &Node| usize::from(node.children().count);
-        let (mut from_groups, mut from_below) = (0, 0);
-        for size in above.iter().map(count).filter(|size| *size > 0) {
-            let group = &groups[from_groups..from_groups + size];
-            from_groups += size;
-            let in_family = group.iter().map(count).sum();
-            if in_family == 0 {
-                continue;
-            }
-            pager.begin_family(in_family);
-            for size in group.iter().map(count).filter(|size| *size > 0) {
-                let range = from_below..from_below + size;
-                pager.push_group(&below[range.clone()], colors.get(range).unwrap_or_default(), level, *radius);
-                from_below += size;
-            }
+        let Some(chunk) = chunk else {
+            let top = &self.quantised.top;
+            contents.nodes.extend(top.nodes[first..first + count].iter().map(|node| Node(*node)));
+            contents.colors.extend_from_slice(top.colors.get(first..first + count).unwrap_or_default());
+            return Ok(());
+        };
+        let start = self.firsts[chunk as usize][1] + first as u64;
+        self.quantised.nodes.read_vec(start, count, &mut scratch.nodes)?;
+        contents.nodes.extend(scratch.nodes.iter().map(|node| Node(*node)));
+        if self.quantised.colors.len() > 0 {
+            self.quantised.colors.read_vec(start, count, &mut scratch.colors)?;
+            contents.colors.extend_from_slice(&scratch.colors);
         }
-        next.push(Run::Chunk { chunk, level: inside + 1 });
         Ok(())
     }
 
-    fn push_top(&self, group: &ChildList, level: usize, pager: &mut Pager) {
-        let (mut nodes, mut colors, mut radius) = (Vec::new(), Vec::new(), 0.0_f32);
-        for index in group.as_slice() {
-            let index = *index as usize;
-            let node = &self.quantised.top[index];
-            nodes.push(self.quantised.top_nodes[index]);
-            if self.colors.len() > 0 {
-                colors.push(packed_color(node.mean_color));
-            }
-            radius = radius.max(node.sphere.radius);
-        }
-        pager.push_group(&nodes, &colors, level, radius);
+    /// Where the family of a number lies.
+    fn place(&self, number: u64) -> FamilyPlace {
+        let page = self.starts.partition_point(|start| start.number <= number) - 1;
+        FamilyPlace { page: PageId(page as u32), family: (number - self.starts[page].number) as u16 }
     }
+}
 
-    /// Nodes of a level of a chunk, and their colours or none.
-    fn level(&self, chunk: usize, level: usize) -> io::Result<(Vec<Node>, Vec<u16>)> {
-        let levels = &self.quantised.levels[chunk];
-        let before: u64 = levels[..level].iter().map(|(count, _)| u64::from(*count)).sum();
-        let (start, count) = (self.starts[chunk] + before, levels[level].0 as usize);
-        let (mut words, mut colors) = (Vec::new(), Vec::new());
-        self.quantised.nodes.read_vec(start, count, &mut words)?;
-        if self.colors.len() > 0 {
-            self.colors.read_vec(start, count, &mut colors)?;
-        }
-        Ok((words.into_iter().map(Node).collect(), colors))
+/// Number in the file of a tree's family, by where the tree's stretches begin.
+fn number_of(numbers: &[(u32, u64)], family: u32) -> u64 {
+    let (first, number) = numbers[numbers.partition_point(|(first, _)| *first <= family) - 1];
+    number + u64::from(family - first)
+}
+
+/// Appends the runs of a tree; returns how many families, nodes and links they have.
+fn place_runs(chunk: Option<u32>, runs: &[Run], out: &mut Vec<Stretch>) -> [u64; 3] {
+    let [mut first_family, mut first_node, mut first_link] = [0; 3];
+    for run in runs {
+        out.push(Stretch { chunk, run: *run, number: 0, first_family, first_node, first_link });
+        first_family += run.families;
+        first_node += run.nodes;
+        first_link += run.links;
     }
+    [first_family, first_node, first_link].map(u64::from)
 }

@@ -2,14 +2,125 @@
 
 use super::plan::MemoryPlan;
 use crate::BuildError;
+use crate::journal::Extent;
 use crate::progress::Phases;
-use crate::spool::Spool;
+use crate::spool::{Place, Spool};
+use crate::work::Work;
+use bytemuck::Pod;
 use gigalod_import::{Batch, ModelStream};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use std::io;
+
+/// The position of a vertex, in either precision.
+pub(super) trait Corner: Copy + Pod + Send + Sync {
+    /// The vector from another one to this one.
+    fn minus(&self, other: &Self) -> [f32; 3];
+
+    fn exact(&self) -> DVec3;
+}
+
+impl Corner for [f32; 3] {
+    fn minus(&self, other: &Self) -> [f32; 3] {
+        std::array::from_fn(|axis| self[axis] - other[axis])
+    }
+
+    fn exact(&self) -> DVec3 {
+        Vec3::from_array(*self).as_dvec3()
+    }
+}
+
+impl Corner for [f64; 3] {
+    fn minus(&self, other: &Self) -> [f32; 3] {
+        std::array::from_fn(|axis| (self[axis] - other[axis]) as f32)
+    }
+
+    fn exact(&self) -> DVec3 {
+        DVec3::from_array(*self)
+    }
+}
+
+/// Model space. As narrow as the model is: half the bytes that have to be fetched again and again.
+#[derive(Debug)]
+pub(super) enum Positions {
+    /// All coordinates are `f32`s.
+    Narrow(Spool<[f32; 3]>),
+    Wide(Spool<[f64; 3]>),
+}
+
+/// Names of the spools of positions in a work folder.
+const NARROW: &str = "positions";
+const WIDE: &str = "wide_positions";
+
+impl Positions {
+    /// Puts all on disk; returns the name, too.
+    pub(super) fn secure(&self) -> io::Result<(String, Extent)> {
+        match self {
+            Self::Narrow(spool) => spool.secure(),
+            Self::Wide(spool) => spool.secure(),
+        }
+    }
+
+    /// As an earlier process left them.
+    pub(super) fn reopen(work: &Work) -> io::Result<Self> {
+        if work.has(WIDE) {
+            Ok(Self::Wide(Spool::reopen(work, WIDE)?))
+        } else {
+            Ok(Self::Narrow(Spool::reopen(work, NARROW)?))
+        }
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        match self {
+            Self::Narrow(spool) => spool.len(),
+            Self::Wide(spool) => spool.len(),
+        }
+    }
+
+    fn expect(&mut self, vertices: u64) {
+        match self {
+            Self::Narrow(spool) => spool.expect(vertices),
+            Self::Wide(spool) => spool.expect(vertices),
+        }
+    }
+
+    fn push(&mut self, positions: &[DVec3], place: &Place<'_>) -> io::Result<()> {
+        if let Self::Narrow(spool) = self {
+            if positions.iter().all(|position| position.as_vec3().as_dvec3() == *position) {
+                let narrow: Vec<[f32; 3]> = positions.iter().map(|position| position.as_vec3().to_array()).collect();
+                return spool.push(&narrow);
+            }
+            // The first that is not: those before it are widened.
+            let mut wide = Spool::named(place, WIDE)?;
+            spool.for_each_piece(MemoryPlan::PIECE, |_, piece| {
+                wide.push(&piece.iter().map(|position| position.exact().to_array()).collect::<Vec<_>>())
+            })?;
+            *self = Self::Wide(wide);
+        }
+        if let Self::Wide(spool) = self {
+            spool.push(&positions.iter().map(DVec3::to_array).collect::<Vec<_>>())?;
+        }
+        Ok(())
+    }
+
+    /// Positions of the vertices from `start` on.
+    pub(super) fn read_vec(&self, start: u64, count: usize, out: &mut Vec<DVec3>) -> io::Result<()> {
+        fn read<C: Corner>(spool: &Spool<C>, start: u64, count: usize, out: &mut Vec<DVec3>) -> io::Result<()> {
+            let mut corners = Vec::new();
+            spool.read_vec(start, count, &mut corners)?;
+            out.clear();
+            out.extend(corners.iter().map(C::exact));
+            Ok(())
+        }
+        match self {
+            Self::Narrow(spool) => read(spool, start, count, out),
+            Self::Wide(spool) => read(spool, start, count, out),
+        }
+    }
+}
 
 /// An indexed mesh as it was read.
 pub(super) struct Mesh {
-    pub(super) positions: Spool<[f64; 3]>,
+    pub(super) positions: Positions,
     /// One for each vertex, or empty.
     pub(super) normals: Spool<[f32; 3]>,
     /// 8-bit sRGB, one for each vertex, or empty.
@@ -21,7 +132,7 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
     phases.begin("read", input.bytes_consumed().1);
     let place = plan.place();
     let mut mesh = Mesh {
-        positions: Spool::named(&place, "positions").map_err(BuildError::Scratch)?,
+        positions: Positions::Narrow(Spool::named(&place, NARROW).map_err(BuildError::Scratch)?),
         normals: Spool::named(&place, "normals").map_err(BuildError::Scratch)?,
         colors: Spool::named(&place, "colors").map_err(BuildError::Scratch)?,
         triangles: Spool::named(&place, "triangles").map_err(BuildError::Scratch)?,
@@ -33,14 +144,11 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
     }
     let mut batch = Batch::default();
     let mut normals: Vec<[f32; 3]> = Vec::new();
-    let mut positions: Vec<[f64; 3]> = Vec::new();
     while input.next(&mut batch)? {
-        positions.clear();
-        positions.extend(batch.vertices.positions.iter().map(|position| position.to_array()));
         normals.clear();
         normals.extend(batch.vertices.normals.iter().map(Vec3::to_array));
         let mut push = || {
-            mesh.positions.push(&positions)?;
+            mesh.positions.push(&batch.vertices.positions, &place)?;
             mesh.normals.push(&normals)?;
             mesh.colors.push(&batch.vertices.colors)?;
             mesh.triangles.push(&batch.triangles)

@@ -3,31 +3,35 @@
 //! The way of the data, a file for each step:
 //!
 //! ```text
-//! mesh ──▶ leaves ──▶ divide ──▶ chunk: tree, contract ──▶ quantise ──▶ layout, pager ──▶ pages
-//! stream   a sphere   chunks of  binary,   2–4 children    codes,       breadth-first
-//!          a vertex   65,536     midpoint  a node          top-down     families
+//! mesh ──▶ leaves ──▶ divide ──▶ chunk: tree, contract, kept ──▶ quantise: lower ──▶ layout ──▶ pages
+//! stream   facets,    chunks of  binary,  2–4       measured     codes, top-down;    order of   coded
+//!          join       65,536     midpoint children               by size            the file
 //! ```
 //!
 //! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk. On
 //! disk, `checkpoint.rs` makes of the end of each step a place to continue from.
 //!
-//! What always holds: each decoded sphere encloses the true sphere of its node, and with it all true leaves below; each
-//! node's cone holds the cones of its children as decoded, and a leaf's cone the normals of all triangles at its vertex.
-//! The tree depends on the set of vertices alone, not on their order, and
-//! the bytes of the file on nothing else but the sums of normals, which are taken in the order of the triangles.
+//! What always holds: each decoded sphere encloses all true leaves below its node; each node's cone holds the normals of all
+//! triangles at the vertices below it. The bytes of the file depend on the sets of vertices and triangles and on nothing else: not
+//! on their order in the input, not on memory, not on threads.
 
 mod checkpoint;
 mod chunk;
 mod contract;
 mod divide;
+mod facets;
 mod join;
+mod kept;
 mod layout;
 mod leaves;
+mod lower;
+mod measure;
 mod mesh;
 mod orientation;
-mod pager;
+mod pages;
 mod plan;
 mod quantise;
+mod reorder;
 mod tree;
 
 use crate::journal::Header;
@@ -87,7 +91,7 @@ pub fn build(
 
     let mut input = Some(input);
     let (mut stage, resumed_after) = checkpoint::load(work.as_ref()).map_err(BuildError::Scratch)?;
-    let (facts, quantised, colors) = loop {
+    let (facts, chunks) = loop {
         stage = match stage {
             Stage::Start => {
                 let mut input = input.take().expect("a build starts once");
@@ -110,14 +114,7 @@ pub fn build(
                 let chunks = workers.install(|| divide::divide(division, facts.has_colors, &plan, &phases, save))?;
                 Stage::Tree(facts, chunks)
             }
-            Stage::Tree(facts, mut chunks) => {
-                let top = std::mem::take(&mut chunks.top);
-                let quantised = workers
-                    .install(|| quantise::top_down(&chunks, top, &plan, &phases))
-                    .map_err(BuildError::Scratch)?;
-                Stage::Quantised(facts, quantised, chunks.colors)
-            }
-            Stage::Quantised(facts, quantised, colors) => break (facts, quantised, colors),
+            Stage::Tree(facts, chunks) => break (facts, chunks),
         };
         if let Some(work) = &work {
             checkpoint::save(work, &stage).map_err(BuildError::Scratch)?;
@@ -125,15 +122,16 @@ pub fn build(
     };
     drop(input);
     let Facts { counts, origin, bounds, closed, has_colors } = facts;
-    let layout::Written { writer, pages, model, nodes, leaves, levels, raw_bytes } =
-        workers.install(|| layout::write(&quantised, &colors, output.file(), &phases)).map_err(BuildError::Output)?;
+    let quantised = workers.install(|| quantise::top_down(chunks, &plan, &phases)).map_err(BuildError::Scratch)?;
+    let pages::Written { writer, pages, model, nodes, levels, raw_bytes } =
+        workers.install(|| pages::write(&quantised, output.file(), &phases)).map_err(BuildError::Output)?;
     let root = Root {
         origin,
-        sphere: quantised.top[0].sphere,
+        sphere: quantised.root,
         overhang: quantised.overhang,
         bounds,
         nodes,
-        leaves,
+        leaves: quantised.leaves,
         levels: levels.len() as u32,
         has_colors,
         closed,
@@ -160,7 +158,7 @@ pub fn build(
     let (buffer, output_bytes) = writer.finish(&skeleton, &metadata).map_err(BuildError::Output)?;
     drop(buffer);
     output.publish().map_err(BuildError::Output)?;
-    drop((quantised, colors));
+    drop(quantised);
     if let Some(work) = work {
         work.done();
     }

@@ -10,12 +10,12 @@ use gigalod_import::ModelStream;
 
 /// What the spools take for each vertex and triangle, at the stage where they take most: position, normal, colour and gathered
 /// attributes; then leaf, kept nodes and packed nodes.
-const SPOOLED_PER_VERTEX: u64 = 24 + 12 + 3 + 16;
-const SPOOLED_PER_TRIANGLE: u64 = 12;
+const SPOOLED_PER_VERTEX: u64 = 24 + 12 + 3 + 16 + 4;
+const SPOOLED_PER_TRIANGLE: u64 = 12 + 6;
 
-/// Bytes of work for each triangle that is joined with its vertices at a time: its corners, their places and order, positions
-/// and contributions.
-const WORK_PER_TRIANGLE: u64 = 12 + 3 * (8 + 24 + 16 + 16);
+/// Bytes of work for each triangle that is joined with its vertices at a time: the triangle, its corners, their order, positions,
+/// and what it gives to its vertices; all but the positions twice, as the batch before is gathered meanwhile.
+const WORK_PER_TRIANGLE: u64 = 12 + 3 * 24 + 2 * (12 + 3 * 8 + 32 + 6);
 
 /// Bytes of work for each leaf of a block: the leaf, its kept nodes, and a share of the trees in work.
 const WORK_PER_LEAF: u64 = 160;

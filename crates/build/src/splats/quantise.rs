@@ -1,29 +1,37 @@
-//! Top-down quantisation: each node's sphere becomes a code relative to its parent's *decoded* sphere, first in the tree on top,
-//! then in all chunks, each by itself.
+//! Top-down quantisation of the whole model: first the tree on top, then all chunks, each by itself.
+//!
+//! [`Chunks`] go in; [`Quantised`] trees come out, in the order of the file as far as one tree goes.
 
-use super::chunk::{self, Kept, Lowered};
-use super::contract::ChildList;
 use super::divide::Chunks;
+use super::kept::KeptTree;
+use super::lower::{self, Family, Link, Lowered, Place, Run};
 use super::plan::MemoryPlan;
-use super::tree::Binary;
 use crate::progress::Phases;
 use crate::spool::Spool;
 use gigalod_format::splats::Node;
-use gigalod_geom::quantise::sphere;
+use gigalod_geom::Sphere;
 use gigalod_geom::sphere::round_up;
 use rayon::prelude::*;
 use std::io;
 
-/// All nodes in their final form.
+/// All trees in their final form.
 pub(super) struct Quantised {
-    /// The tree on top, preorder: spheres decoded, codes set. Its units are the chunks' roots.
-    pub(super) top: Vec<Binary>,
-    /// Final forms of the tree on top's kept nodes, at their indices; others are meaningless.
-    pub(super) top_nodes: Vec<Node>,
-    /// Nodes of all chunks, each chunk breadth first; the roots' codes are in `top_nodes`.
+    /// The model's root.
+    pub(super) root: Sphere,
+    pub(super) top: Lowered,
+    /// Of all chunks, one after the other.
     pub(super) nodes: Spool<u32>,
-    /// Number of nodes on each level of each chunk, and the largest decoded radius there.
-    pub(super) levels: Vec<Vec<(u32, f32)>>,
+    /// 5-6-5, for each node, or empty.
+    pub(super) colors: Spool<u16>,
+    pub(super) families: Spool<Family>,
+    /// Numbers of families in the same chunk.
+    pub(super) links: Spool<u32>,
+    /// The runs of each chunk.
+    pub(super) runs: Vec<Vec<Run>>,
+    /// Number of leaves.
+    pub(super) leaves: u64,
+    /// Number of nodes on each level, and the largest decoded radius there.
+    pub(super) levels: Vec<(u64, f32)>,
     /// How far decoded descendants reach from a node's centre, in units of its radius; the largest of all nodes, ≥ 1.
     pub(super) overhang: f32,
 }
@@ -31,98 +39,115 @@ pub(super) struct Quantised {
 /// Chunks that are quantised side by side.
 const CHUNKS_AT_ONCE: usize = 8;
 
-pub(super) fn top_down(
-    chunks: &Chunks,
-    mut top: Vec<Binary>,
-    plan: &MemoryPlan<'_>,
-    phases: &Phases<'_>,
-) -> io::Result<Quantised> {
+pub(super) fn top_down(mut chunks: Chunks, plan: &MemoryPlan<'_>, phases: &Phases<'_>) -> io::Result<Quantised> {
     phases.begin("quantise", chunks.kept.len());
-    top[0].code = sphere::SELF;
-    let order = kept_of(&top);
-    for index in &order {
-        let parent = top[*index].sphere;
-        for child in ChildList::of(&top, *index).as_slice() {
-            let child = &mut top[*child as usize];
-            (child.code, child.sphere) = sphere::encode(&parent, &child.sphere);
-        }
+    let top_tree = std::mem::take(&mut chunks.top);
+    let root = top_tree.nodes[0].sphere();
+    let mut chunk_of = vec![None; top_tree.nodes.len()];
+    for (chunk, node) in top_tree.unit_nodes.iter().enumerate() {
+        chunk_of[*node as usize] = Some(chunk as u32);
     }
+    let top = lower::lower(&top_tree, &root, &Place::Top(&chunk_of));
+    let mut out = Quantised {
+        root,
+        nodes: Spool::new(&plan.place())?,
+        colors: Spool::new(&plan.place())?,
+        families: Spool::new(&plan.place())?,
+        links: Spool::new(&plan.place())?,
+        runs: Vec::with_capacity(chunks.sizes.len()),
+        levels: top.levels.clone(),
+        leaves: count_leaves(&top.nodes),
+        overhang: 1.0,
+        top,
+    };
+    out.nodes.expect(chunks.kept.len());
+    out.colors.expect(chunks.colors.len());
+    let root_levels = root_levels(&out.top, &top_tree);
 
-    let roots: Vec<&Binary> = top.iter().filter(|node| node.units == 1).collect();
-    let mut starts = Vec::with_capacity(chunks.sizes.len());
-    let mut nodes = Spool::named(&plan.place(), "nodes")?;
-    nodes.expect(chunks.kept.len());
-    let (mut levels, mut overhang) = (Vec::with_capacity(roots.len()), 1.0_f64);
-    let mut reach = vec![0.0; top.len()];
     let mut start = 0;
-    for size in &chunks.sizes {
-        starts.push(start);
-        start += u64::from(*size);
-    }
-    let mut reaches = Vec::with_capacity(roots.len());
-    for batch in (0..roots.len()).collect::<Vec<_>>().chunks(CHUNKS_AT_ONCE) {
+    let starts: Vec<u64> = chunks
+        .sizes
+        .iter()
+        .map(|size| {
+            start += u64::from(*size);
+            start - u64::from(*size)
+        })
+        .collect();
+    let (mut overhang, mut reaches) = (1.0_f64, Vec::with_capacity(starts.len()));
+    let mut done = 0;
+    for batch in (0..starts.len()).collect::<Vec<_>>().chunks(CHUNKS_AT_ONCE) {
         let lowered = batch
             .par_iter()
             .map(|chunk| {
-                let mut kept: Vec<Kept> = Vec::new();
-                chunks.kept.read_vec(starts[*chunk], chunks.sizes[*chunk] as usize, &mut kept)?;
-                Ok(chunk::lower(&kept, &roots[*chunk].sphere))
+                let (start, size) = (starts[*chunk], chunks.sizes[*chunk] as usize);
+                let mut tree = KeptTree::default();
+                chunks.kept.read_vec(start, size, &mut tree.nodes)?;
+                if chunks.colors.len() > 0 {
+                    chunks.colors.read_vec(start, size, &mut tree.colors)?;
+                }
+                let node = top_tree.unit_nodes[*chunk] as usize;
+                let place = Place::Chunk { level: root_levels[*chunk], model_radius: root.radius };
+                let lowered = lower::lower(&tree, &out.top.decoded[node], &place);
+                let reach = lowered.reach(&tree, |_| None);
+                Ok((lowered, reach))
             })
-            .collect::<io::Result<Vec<Lowered>>>()?;
-        for chunk in lowered {
-            let words: Vec<u32> = chunk.nodes.iter().map(|node| node.0).collect();
-            nodes.push(&words)?;
-            overhang = overhang.max(chunk.overhang);
-            reaches.push(chunk.reach);
-            levels.push(chunk.levels.into_iter().zip(chunk.radii).collect());
+            .collect::<io::Result<Vec<_>>>()?;
+        for (chunk, (lowered, (reach, chunk_overhang))) in batch.iter().zip(lowered) {
+            overhang = overhang.max(chunk_overhang);
+            reaches.push(reach);
+            out.push(lowered, usize::from(root_levels[*chunk]))?;
+            done += u64::from(chunks.sizes[*chunk]);
         }
-        phases.at(nodes.len());
+        phases.at(done);
     }
-
-    // Children before parents: how far what hangs from the tree on top reaches.
-    let mut reaches = reaches.into_iter();
-    for (index, _) in top.iter().enumerate().filter(|(_, node)| node.units == 1) {
-        reach[index] = reaches.next().expect("a reach for each chunk");
-    }
-    for index in order.iter().rev() {
-        let parent = &top[*index].sphere;
-        reach[*index] = f64::max(reach[*index], f64::from(parent.radius));
-        for child in ChildList::of(&top, *index).as_slice() {
-            let child = *child as usize;
-            let apart = f64::from(top[child].sphere.center.distance(parent.center));
-            reach[*index] = f64::max(reach[*index], apart + reach[child]);
-        }
-        if parent.radius > 0.0 {
-            overhang = overhang.max(reach[*index] / f64::from(parent.radius));
-        }
-    }
-
-    let mut top_nodes = vec![Node::default(); top.len()];
-    let mut chunk = 0;
-    for (index, node) in top.iter().enumerate() {
-        top_nodes[index] = if node.units == 1 {
-            // What a chunk's root is like, the chunk knows.
-            let mut root = [0];
-            nodes.read(starts[chunk], &mut root)?;
-            chunk += 1;
-            let inside = Node(root[0]);
-            Node::pack(node.code, inside.normal(), inside.cone(), inside.children())
-        } else {
-            Kept::of(&top, index).pack(node.code)
-        };
-    }
+    let reach_of = |node: usize| chunk_of[node].map(|chunk| reaches[chunk as usize]);
+    let (_, top_overhang) = out.top.reach(&top_tree, reach_of);
     // The sum of rounded distances, rounded outwards once more.
-    let overhang = round_up(overhang * (1.0 + 1e-6));
-    Ok(Quantised { top, top_nodes, nodes, levels, overhang })
+    out.overhang = round_up(overhang.max(top_overhang) * (1.0 + 1e-6));
+    Ok(out)
 }
 
-/// Indices of the nodes that were kept, parents before children.
-fn kept_of(top: &[Binary]) -> Vec<usize> {
-    let mut order = vec![0];
-    let mut next = 0;
-    while next < order.len() {
-        order.extend(ChildList::of(top, order[next]).as_slice().iter().map(|child| *child as usize));
-        next += 1;
+impl Quantised {
+    fn push(&mut self, lowered: Lowered, level: usize) -> io::Result<()> {
+        self.nodes.push(&lowered.nodes)?;
+        self.leaves += count_leaves(&lowered.nodes);
+        self.colors.push(&lowered.colors)?;
+        self.families.push(&lowered.families)?;
+        let links: Vec<u32> = lowered
+            .links
+            .iter()
+            .map(|link| match link {
+                Link::Own(family) | Link::Chunk(family) => *family,
+            })
+            .collect();
+        self.links.push(&links)?;
+        self.runs.push(lowered.runs);
+        for (at, (count, radius)) in lowered.levels.into_iter().enumerate() {
+            let at = level + at;
+            if self.levels.len() <= at {
+                self.levels.resize(at + 1, (0, 0.0));
+            }
+            self.levels[at].0 += count;
+            self.levels[at].1 = self.levels[at].1.max(radius);
+        }
+        Ok(())
     }
-    order
+}
+
+fn count_leaves(nodes: &[u32]) -> u64 {
+    nodes.iter().filter(|node| Node(**node).is_leaf()).count() as u64
+}
+
+/// Levels of the chunks' roots.
+fn root_levels(top: &Lowered, tree: &KeptTree) -> Vec<u16> {
+    let mut levels = vec![0_u16; tree.nodes.len()];
+    for at in 0..tree.nodes.len() {
+        let first = top.first_children[at] as usize;
+        if first > 0 {
+            let below = first..first + usize::from(tree.nodes[at].children().count);
+            let level = levels[at] + 1;
+            levels[below].fill(level);
+        }
+    }
+    tree.unit_nodes.iter().map(|node| levels[*node as usize]).collect()
 }

@@ -1,20 +1,23 @@
-//! Splats: a hierarchy of bounding spheres, breadth first, in pages.
+//! Splats: a hierarchy of bounding spheres, larger ones first, in pages.
 //!
 //! The words: a *node* is 32 bits (plus 16 of colour). The children of one node are a *group* of 2–4 nodes. The groups that
-//! hang from one group, its up to 16 grandchildren-to-be, are a *family*; it follows in breadth-first order without a gap,
-//! so one pointer per group finds it, and none is needed where all nodes of the group are leaves. A family never straddles
-//! two pages. On disk pointers are left out: they follow from the tree bits and from where a page's first family lies, and
-//! [`Page`] puts them in when it decodes.
+//! hang from one group, its up to 16 grandchildren-to-be, are a *family*; it lies in one piece, so one pointer per group finds
+//! it, and none is needed where all nodes of the group are leaves. A family never straddles two pages. On disk a pointer is a
+//! *link*: one of a few cursors of the page ([`links`]), and how many families it skips; [`Page`] puts pointers in when it decodes.
 //!
 //! Source: the splats paper, sections 3.1 and 3.2.
 
 pub mod codec;
+mod contents;
+pub mod links;
 pub mod node;
 pub mod page;
 pub mod skeleton;
 
+pub use contents::PageContents;
+pub use links::{FamilyPlace, Link, Linker};
 pub use node::{Children, Node};
-pub use page::{Page, PageContents, WordIndex};
+pub use page::{Page, WordIndex};
 pub use skeleton::{PageId, PageRecord, Root, Skeleton};
 
 use crate::container::{Section, read_checked};

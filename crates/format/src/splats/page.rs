@@ -1,137 +1,44 @@
-//! A page of nodes: on disk, and as it is traversed.
+//! A page of nodes as it is traversed: the groups one after the other, each followed by a pointer word unless all its nodes are
+//! leaves, exactly as in the paper's figure 2b.
 //!
-//! On disk (codec 0, *raw*): `u32` number of groups g; ⌈g/4⌉ bytes with the size of each group less one in 2 bits, lowest
-//! bits first; the nodes as `u32`; with colours, one `u16` (5-6-5) for each node. In memory: the groups one after the other,
-//! each followed by a pointer word unless all its nodes are leaves, exactly as in the paper's figure 2b.
-//!
-//! What always holds after decoding, even of hostile bytes: a pointer leads forwards (to a later page, or a later word of
-//! the same page), and the family there ends within its page. What cannot be seen from one page is whether a node announces
-//! as many children as the group has that its pointer leads to; where that is a lie, a traversal can take a node for a
-//! pointer, so it must count what it visits.
+//! In: a page's bytes, or its [`PageContents`]. Out: words, and where families begin.
+//! What always holds after decoding, even of hostile bytes: a pointer leads forwards (to a later page, or a later family of
+//! the same page), to a family that there is. What cannot be seen from one page is whether a node announces as many children
+//! as the group has that its pointer leads to; where that is a lie, a traversal can take a node for a pointer, so it must count
+//! what it visits.
 
-use super::codec;
-use super::node::Node;
+use super::contents::PageContents;
+use super::links::{Cursors, FamilyPlace, MAX_RUNS};
 use super::skeleton::{PageId, PageRecord, Skeleton};
 use crate::FormatError;
 
 /// Most nodes a page may hold: about 32 KiB raw. Larger pages mean fewer records in the skeleton, smaller ones less that is
 /// read in vain at the borders of what is looked at.
 pub const MAX_NODES: usize = 8192;
+/// Most families of a page: they have two nodes at least, but for the root's. A pointer has 12 bits for their number.
+pub const MAX_FAMILIES: usize = MAX_NODES / 2;
 
-/// Nodes and colours as stored.
+/// Nodes, colours and links as they are.
 pub const CODEC_RAW: u8 = 0;
-/// Entropy-coded under the file's model: [`codec`].
+/// Entropy-coded under the file's model: [`super::codec`].
 pub const CODEC_ENTROPY: u8 = 1;
 
 /// Index of a word (node or pointer) in a decoded page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct WordIndex(pub u16);
 
-/// What is written: groups in breadth-first order.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct PageContents {
-    /// Nodes in each group: 2–4; 1 for the root's.
-    pub group_sizes: Vec<u8>,
-    /// All nodes, group by group.
-    pub nodes: Vec<Node>,
-    /// 5-6-5, one for each node, or empty.
-    pub colors: Vec<u16>,
-}
-
-/// Where a pointer leads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FamilyStart {
-    /// Page of the family.
-    pub page: PageId,
-    /// Its first word there.
-    pub word: WordIndex,
-}
-
 /// A decoded page.
 #[derive(Clone, Debug)]
 pub struct Page {
-    /// Nodes, and after each group with grandchildren a pointer.
+    /// Nodes, and after each group with grandchildren a pointer: `run << 28 | pages from the run's first << 12 | family`.
     words: Vec<u32>,
     /// 5-6-5 at the index of each node's word; empty without colours.
     colors: Vec<u16>,
-    /// Pointers count pages from here.
-    first_child_page: PageId,
+    /// Word at which each family begins.
+    families: Vec<u16>,
+    /// The first page of each run.
+    run_pages: [PageId; MAX_RUNS],
     nodes: u16,
-}
-
-impl PageContents {
-    /// Empties it, keeping its buffers.
-    pub fn clear(&mut self) {
-        self.group_sizes.clear();
-        self.nodes.clear();
-        self.colors.clear();
-    }
-
-    /// Length of [`PageContents::encode`].
-    pub fn raw_bytes(&self) -> usize {
-        4 + self.group_sizes.len().div_ceil(4) + self.nodes.len() * 4 + self.colors.len() * 2
-    }
-
-    /// The bytes of a raw page.
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(self.raw_bytes());
-        out.extend((self.group_sizes.len() as u32).to_le_bytes());
-        out.extend(
-            self.group_sizes
-                .chunks(4)
-                .map(|sizes| sizes.iter().enumerate().fold(0u8, |byte, (at, size)| byte | (size - 1) << (2 * at))),
-        );
-        out.extend(self.nodes.iter().flat_map(|node| node.0.to_le_bytes()));
-        out.extend(self.colors.iter().flat_map(|color| color.to_le_bytes()));
-        out
-    }
-
-    /// The bytes of a page as they stand in a file, by whatever codec its record names.
-    ///
-    /// # Errors
-    /// [`FormatError::Invalid`] where they make no page of as many nodes as the record says.
-    pub fn decode(bytes: &[u8], skeleton: &Skeleton, page: PageId) -> Result<Self, FormatError> {
-        let (record, has_colors) = (skeleton.record(page), skeleton.root().has_colors);
-        match (record.codec, skeleton.model()) {
-            (CODEC_RAW, _) => Self::decode_raw(bytes, record, has_colors, page),
-            (CODEC_ENTROPY, Some(model)) => codec::decode(bytes, model, record, has_colors, page),
-            (CODEC_ENTROPY, None) => {
-                Err(FormatError::invalid(format!("page {page}"), "codec 1, but the file has no model"))
-            }
-            (codec, _) => Err(FormatError::invalid(format!("page {page}"), format!("codec {codec}, expected 0 or 1"))),
-        }
-    }
-
-    /// Undoes [`PageContents::encode`].
-    ///
-    /// # Errors
-    /// [`FormatError::Invalid`] where sizes do not add up.
-    pub fn decode_raw(bytes: &[u8], record: &PageRecord, has_colors: bool, page: PageId) -> Result<Self, FormatError> {
-        let invalid = |problem: String| FormatError::invalid(format!("page {page}"), problem);
-        let nodes = usize::from(record.nodes);
-        let Some((group_count, rest)) = bytes.split_first_chunk() else {
-            return Err(invalid(format!("{} bytes, expected at least 4", bytes.len())));
-        };
-        let group_count = u32::from_le_bytes(*group_count) as usize;
-        let size_bytes = group_count.div_ceil(4);
-        let expected = size_bytes + nodes * if has_colors { 6 } else { 4 };
-        if group_count > nodes || rest.len() != expected {
-            let found = rest.len();
-            return Err(invalid(format!(
-                "{found} bytes for {nodes} nodes in {group_count} groups, expected {expected}"
-            )));
-        }
-        let (sizes, rest) = rest.split_at(size_bytes);
-        let (words, colors) = rest.split_at(nodes * 4);
-        let group_sizes: Vec<u8> = (0..group_count).map(|at| (sizes[at / 4] >> (2 * (at % 4)) & 3) + 1).collect();
-        let in_groups: usize = group_sizes.iter().map(|size| usize::from(*size)).sum();
-        if in_groups != nodes {
-            return Err(invalid(format!("groups of {in_groups} nodes in all, expected {nodes}")));
-        }
-        let nodes = words.chunks_exact(4).map(|w| Node(u32::from_le_bytes([w[0], w[1], w[2], w[3]]))).collect();
-        let colors = colors.chunks_exact(2).map(|c| u16::from_le_bytes([c[0], c[1]])).collect();
-        Ok(Self { group_sizes, nodes, colors })
-    }
 }
 
 impl Page {
@@ -144,54 +51,76 @@ impl Page {
         Self::link(&contents, skeleton, page)
     }
 
-    /// Puts the pointers in: families follow each other from the record's `first_child` on, page after page.
-    fn link(contents: &PageContents, skeleton: &Skeleton, page: PageId) -> Result<Self, FormatError> {
+    /// Puts the pointers in.
+    ///
+    /// # Errors
+    /// [`FormatError::Invalid`] where a link leads nowhere or backwards, or counts are not the record's.
+    pub fn link(contents: &PageContents, skeleton: &Skeleton, page: PageId) -> Result<Self, FormatError> {
         let invalid = |problem: String| FormatError::invalid(format!("page {page}"), problem);
+        contents.check_sums(page)?;
         let record = skeleton.record(page);
+        for (what, found, expected) in [
+            ("families", contents.family_groups.len(), record.families),
+            ("nodes", contents.nodes.len(), record.nodes),
+            ("nodes and pointers", contents.words(), record.words),
+        ] {
+            if found != usize::from(expected) {
+                return Err(invalid(format!("{found} {what}, expected {expected}")));
+            }
+        }
+        let Some(mut cursors) = Cursors::new(&contents.runs, skeleton) else {
+            return Err(invalid(format!("{} runs, expected at most 16 that begin at families", contents.runs.len())));
+        };
+        let mut run_pages = [PageId(0); MAX_RUNS];
+        for (run_page, run) in run_pages.iter_mut().zip(&contents.runs) {
+            *run_page = run.page;
+        }
+
         let mut words = Vec::with_capacity(usize::from(record.words));
-        let mut colors = Vec::with_capacity(if contents.colors.is_empty() { 0 } else { usize::from(record.words) });
-        let mut family = FamilyStart { page: record.first_child_page, word: record.first_child_word };
-        let mut at = 0;
-        for size in &contents.group_sizes {
-            let group = at..at + usize::from(*size);
-            at = group.end;
-            let group_word = words.len();
-            words.extend(contents.nodes[group.clone()].iter().map(|node| node.0));
-            if !contents.colors.is_empty() {
-                colors.extend(&contents.colors[group.clone()]);
+        let mut families = Vec::with_capacity(usize::from(record.families));
+        let (mut nodes, mut sizes) = (&contents.nodes[..], contents.group_sizes.iter());
+        let mut links = contents.links.iter();
+        for groups in &contents.family_groups {
+            let family = families.len();
+            families.push(words.len() as u16);
+            for size in sizes.by_ref().take(usize::from(*groups)) {
+                let (group, rest) = nodes.split_at(usize::from(*size));
+                nodes = rest;
+                let mut tree = 0;
+                for node in group {
+                    words.push(node.0);
+                    tree |= node.0;
+                }
+                // A node is inner where it announces children, as in `Node::is_leaf`.
+                if tree & 6 == 0 {
+                    continue;
+                }
+                let Some(link) = links.next() else {
+                    return Err(invalid(format!("{} links, expected more", contents.links.len())));
+                };
+                let here = FamilyPlace { page, family: family as u16 };
+                match cursors.next(*link, skeleton) {
+                    Some((place, pages)) if place > here => {
+                        words.push(u32::from(link.run) << 28 | u32::from(pages) << 12 | u32::from(place.family));
+                    }
+                    found => {
+                        let place = found.map(|(place, _)| format!("family {} of page {}", place.family, place.page));
+                        return Err(invalid(format!(
+                            "the family below family {family}, by run {} and skip {}, is {}, expected a later one",
+                            link.run,
+                            link.skip,
+                            place.as_deref().unwrap_or("none")
+                        )));
+                    }
+                }
             }
-            let family_words: u32 = contents.nodes[group].iter().map(|node| node.children().words()).sum();
-            if family_words == 0 {
-                continue;
-            }
-            let room = u32::from(skeleton.pages().get(family.page.0 as usize).map_or(0, |record| record.words));
-            let end = u32::from(family.word.0) + family_words;
-            if end > room {
-                return Err(invalid(format!("a family ends at word {end} of page {}, which has {room}", family.page)));
-            }
-            let pointer_word = words.len();
-            let forwards = family.page > page || (family.page == page && usize::from(family.word.0) > pointer_word);
-            let delta = u16::try_from(family.page.0 - record.first_child_page.0);
-            let (true, Ok(delta)) = (forwards, delta) else {
-                return Err(invalid(format!(
-                    "the family of word {group_word} lies at word {} of page {}, expected a later one",
-                    family.word.0, family.page
-                )));
-            };
-            words.push(u32::from(delta) << 16 | u32::from(family.word.0));
-            if !colors.is_empty() {
-                colors.push(0);
-            }
-            family = if end == room {
-                FamilyStart { page: PageId(family.page.0 + 1), word: WordIndex(0) }
-            } else {
-                FamilyStart { page: family.page, word: WordIndex(end as u16) }
-            };
         }
-        if words.len() != usize::from(record.words) {
-            return Err(invalid(format!("{} nodes and pointers, expected {}", words.len(), record.words)));
+        let left = links.count();
+        if left > 0 {
+            return Err(invalid(format!("{} links, expected {left} fewer", contents.links.len())));
         }
-        Ok(Self { words, colors, first_child_page: record.first_child_page, nodes: record.nodes })
+        let colors = if contents.colors.is_empty() { Vec::new() } else { spread(contents) };
+        Ok(Self { words, colors, families, run_pages, nodes: record.nodes })
     }
 
     /// Nodes and pointers.
@@ -209,36 +138,65 @@ impl Page {
         usize::from(self.nodes)
     }
 
+    /// Number of families.
+    pub fn family_count(&self) -> usize {
+        self.families.len()
+    }
+
     /// Where the pointer in `word` leads. Anywhere, also backwards and beyond the last page, where `word` is no pointer but a
     /// node, as hostile tree bits can make a traversal believe.
-    pub fn family(&self, word: u32) -> FamilyStart {
-        FamilyStart { page: PageId(self.first_child_page.0.saturating_add(word >> 16)), word: WordIndex(word as u16) }
+    #[inline]
+    pub fn family(&self, word: u32) -> FamilyPlace {
+        let first = self.run_pages[(word >> 28) as usize];
+        FamilyPlace { page: PageId(first.0.saturating_add(word >> 12 & 0xFFFF)), family: (word & 0xFFF) as u16 }
+    }
+
+    /// Where a family begins; `None` where the page has no such.
+    #[inline]
+    pub fn family_word(&self, family: u16) -> Option<WordIndex> {
+        self.families.get(usize::from(family)).map(|word| WordIndex(*word))
     }
 
     /// Bytes that it takes in memory.
     pub fn resident_bytes(&self) -> usize {
-        size_of::<Self>() + self.words.capacity() * 4 + self.colors.capacity() * 2
+        size_of::<Self>() + self.words.capacity() * 4 + (self.colors.capacity() + self.families.capacity()) * 2
     }
 }
 
+/// Colours at the indices of their nodes' words: 0 where pointers are.
+fn spread(contents: &PageContents) -> Vec<u16> {
+    let mut out = Vec::with_capacity(contents.words());
+    let mut at = 0;
+    for size in &contents.group_sizes {
+        let group = at..at + usize::from(*size);
+        at = group.end;
+        out.extend(contents.colors.get(group.clone()).unwrap_or_default());
+        if contents.nodes[group].iter().any(|node| !node.is_leaf()) {
+            out.push(0);
+        }
+    }
+    out
+}
+
 /// Checks what a record claims by itself.
-pub(super) fn check_record(record: &PageRecord, number: u64, page_count: u64) -> Result<(), FormatError> {
+pub(super) fn check_record(record: &PageRecord, number: u64) -> Result<(), FormatError> {
     let nodes = usize::from(record.nodes);
     let pointers = usize::from(record.words).checked_sub(nodes);
-    // A raw page is the longest: 4 bytes of count, a quarter of a byte and 6 bytes for each node.
-    let most_bytes = 4 + nodes * 7;
+    // A raw page is the longest: 4 bytes, 16 runs of 6, and 8½ for each node: 6 for itself, 2 for a link, two quarters.
+    let most_bytes = 104 + nodes * 9;
+    let most_families = nodes.min(MAX_FAMILIES);
     let good = (1..=MAX_NODES).contains(&nodes)
         && pointers.is_some_and(|pointers| pointers <= nodes)
-        && record.bytes as usize <= most_bytes
-        && u64::from(record.first_child_page.0) < page_count;
+        && (1..=most_families).contains(&usize::from(record.families))
+        && record.bytes as usize <= most_bytes;
     if good {
         return Ok(());
     }
     Err(FormatError::invalid(
         format!("the record of page {number}"),
         format!(
-            "{} bytes, {} nodes, {} words, first child in page {}; expected 1–{MAX_NODES} nodes, up to twice as many words, at most {most_bytes} bytes, {page_count} pages",
-            record.bytes, record.nodes, record.words, record.first_child_page
+            "{} bytes, {} nodes, {} words, {} families; expected 1–{MAX_NODES} nodes, up to twice as many words, 1–{most_families} families, at most {most_bytes} bytes",
+            record.bytes, record.nodes, record.words, record.families
         ),
     ))
 }

@@ -2,7 +2,7 @@
 //! entropy-coded pages need.
 
 use super::codec::Model;
-use super::page::{self, WordIndex};
+use super::page;
 use crate::FormatError;
 use crate::bytes::Fields;
 use gigalod_geom::camera::UpAxis;
@@ -52,14 +52,12 @@ pub struct PageRecord {
     pub bytes: u32,
     /// CRC-32C of the bytes on disk.
     pub checksum: u32,
-    /// Page of the first family that hangs from this page; 0 where none does.
-    pub first_child_page: PageId,
-    /// Where that family begins in its page.
-    pub first_child_word: WordIndex,
     /// Nodes in it, 1–8192.
     pub nodes: u16,
     /// Nodes and pointers in it.
     pub words: u16,
+    /// Families in it, 1–4096.
+    pub families: u16,
     /// How its bytes are coded: see [`page`].
     pub codec: u8,
 }
@@ -75,7 +73,7 @@ pub struct Skeleton {
 }
 
 const ROOT_BYTES: usize = 128;
-const RECORD_BYTES: usize = 20;
+const RECORD_BYTES: usize = 16;
 const HAS_COLORS: u32 = 1;
 const CLOSED: u32 = 2;
 const Z_UP: u32 = 4;
@@ -104,8 +102,8 @@ impl Skeleton {
         out.extend((model.len() as u32).to_le_bytes());
         debug_assert_eq!(out.len(), ROOT_BYTES);
         for page in pages {
-            out.extend([page.bytes, page.checksum, page.first_child_page.0].iter().flat_map(|x| x.to_le_bytes()));
-            out.extend([page.first_child_word.0, page.nodes, page.words].iter().flat_map(|x| x.to_le_bytes()));
+            out.extend([page.bytes, page.checksum].iter().flat_map(|x| x.to_le_bytes()));
+            out.extend([page.nodes, page.words, page.families].iter().flat_map(|x| x.to_le_bytes()));
             out.extend([page.codec, 0]);
         }
         out.extend(model);
@@ -169,17 +167,16 @@ impl Skeleton {
             let record = PageRecord {
                 bytes: fields.u32(),
                 checksum: fields.u32(),
-                first_child_page: PageId(fields.u32()),
-                first_child_word: WordIndex(fields.u16()),
                 nodes: fields.u16(),
                 words: fields.u16(),
+                families: fields.u16(),
                 codec: {
                     let codec = fields.u8();
                     fields.u8();
                     codec
                 },
             };
-            page::check_record(&record, number, page_count)?;
+            page::check_record(&record, number)?;
             offsets.push(offset);
             offset = offset.saturating_add(u64::from(record.bytes));
             counted += u64::from(record.nodes);

@@ -55,7 +55,7 @@ impl Forgery {
 
     /// Where the record of a page lies.
     pub(crate) fn record(page: usize) -> usize {
-        SKELETON + 128 + 20 * page
+        SKELETON + 128 + 16 * page
     }
 
     /// Where a page lies, by the records as they are now.
@@ -65,8 +65,20 @@ impl Forgery {
         (file.u64(header::PAGES_OFFSET as u64) + before) as usize
     }
 
+    /// Where a run of a page lies.
+    pub(crate) fn run(&self, page: usize, run: usize) -> usize {
+        self.page(page) + 4 + 6 * run
+    }
+
+    /// Where the links of a page lie: at its end.
+    pub(crate) fn links(&self, page: usize) -> usize {
+        let record = Self::record(page) as u64;
+        let links = Bytes(&self.bytes).u16(record + 10) - Bytes(&self.bytes).u16(record + 8);
+        self.page(page + 1) - 2 * usize::from(links)
+    }
+
     pub(crate) fn page_count(&self) -> usize {
-        (Bytes(&self.bytes).u64(header::SKELETON_BYTES as u64) as usize - 128) / 20
+        (Bytes(&self.bytes).u64(header::SKELETON_BYTES as u64) as usize - 128) / 16
     }
 
     /// Makes all checksums right of what lies within the file.

@@ -52,10 +52,10 @@ fn counts_that_do_not_add_up_are_refused() {
         (92, 1 << 63, format!("the skeleton: pages of {nodes} nodes in all, expected {}", 1u64 << 63)),
         (100, nodes + 1, format!("the skeleton: {} leaves on {levels} levels, expected 1–{nodes} of each", nodes + 1)),
         (100, 0, format!("the skeleton: 0 leaves on {levels} levels, expected 1–{nodes} of each")),
-        (108, 0, "the skeleton: 0 pages in 188 bytes of skeleton".into()),
-        (108, 4, "the skeleton: 4 pages in 188 bytes of skeleton".into()),
-        (108, 1 << 63, format!("the skeleton: {} pages in 188 bytes of skeleton", 1u64 << 63)),
-        (108, u64::MAX / 20 + 1, format!("the skeleton: {} pages in 188 bytes of skeleton", u64::MAX / 20 + 1)),
+        (108, 0, "the skeleton: 0 pages in 176 bytes of skeleton".into()),
+        (108, 4, "the skeleton: 4 pages in 176 bytes of skeleton".into()),
+        (108, 1 << 63, format!("the skeleton: {} pages in 176 bytes of skeleton", 1u64 << 63)),
+        (108, u64::MAX / 16 + 1, format!("the skeleton: {} pages in 176 bytes of skeleton", u64::MAX / 16 + 1)),
     ] {
         assert_eq!(refused(at, value.to_le_bytes()), expected);
     }
@@ -71,7 +71,7 @@ fn a_skeleton_too_short_for_its_root_or_for_whole_records_is_refused() {
     for (bytes, expected) in [
         (0, "the skeleton: 0 bytes, expected at least 128"),
         (127, "the skeleton: 127 bytes, expected at least 128"),
-        (187, "the skeleton: 3 pages in 187 bytes of skeleton"),
+        (175, "the skeleton: 3 pages in 175 bytes of skeleton"),
         (128, "the skeleton: 3 pages in 128 bytes of skeleton"),
     ] {
         let sum = gigalod_format::checksum(&Forgery::new().bytes[SKELETON..SKELETON + bytes]);
@@ -96,34 +96,38 @@ fn records_of_impossible_pages_are_refused() {
     let good = Forgery::new();
     let record = Forgery::record(1);
     let file = Bytes(&good.bytes);
-    let [bytes, first, nodes, words] =
-        [file.u32(256 + 20), file.u32(256 + 28), u32::from(file.u16(256 + 34)), u32::from(file.u16(256 + 36))];
-    let message = |bytes: u32, nodes: u32, words: u32, first: u32| {
+    let at = record as u64;
+    let [bytes, nodes, words, families] =
+        [file.u32(at), file.u16(at + 8).into(), file.u16(at + 10).into(), file.u16(at + 12).into()];
+    let message = |bytes: u32, nodes: u32, words: u32, families: u32| {
         format!(
-            "the record of page 1: {bytes} bytes, {nodes} nodes, {words} words, first child in page {first}; \
-             expected 1–8192 nodes, up to twice as many words, at most {} bytes, 3 pages",
-            4 + 7 * nodes
+            "the record of page 1: {bytes} bytes, {nodes} nodes, {words} words, {families} families; \
+             expected 1–8192 nodes, up to twice as many words, 1–{} families, at most {} bytes",
+            nodes.min(4096),
+            104 + 9 * nodes
         )
     };
-    let refused = |at: usize, value: u16| Forgery::new().u16(record + at, value).refused();
-    assert_eq!(refused(14, 0), message(bytes, 0, words, first));
-    assert_eq!(refused(14, 8193), message(bytes, 8193, words, first));
-    assert_eq!(refused(16, nodes as u16 - 1), message(bytes, nodes, nodes - 1, first));
-    assert_eq!(refused(16, 2 * nodes as u16 + 1), message(bytes, nodes, 2 * nodes + 1, first));
-    assert_eq!(Forgery::new().u32(record + 8, 3).refused(), message(bytes, nodes, words, 3));
-    assert_eq!(Forgery::new().u32(record, u32::MAX).refused(), message(u32::MAX, nodes, words, first));
+    let refused = |at: usize, value: u32| Forgery::new().u16(record + at, value as u16).refused();
+    assert_eq!(refused(8, 0), message(bytes, 0, words, families));
+    assert_eq!(refused(8, 8193), message(bytes, 8193, words, families));
+    assert_eq!(refused(10, nodes - 1), message(bytes, nodes, nodes - 1, families));
+    assert_eq!(refused(10, 2 * nodes + 1), message(bytes, nodes, 2 * nodes + 1, families));
+    for count in [0, nodes + 1, 4097] {
+        assert_eq!(refused(12, count), message(bytes, nodes, words, count));
+    }
+    assert_eq!(Forgery::new().u32(record, u32::MAX).refused(), message(u32::MAX, nodes, words, families));
 }
 
 #[test]
 fn pages_beyond_the_end_of_the_file_are_refused() {
     let len = Forgery::new().bytes.len() as u64;
-    let pages: u64 = (0..3).map(|page| u64::from(Bytes(&Forgery::new().bytes).u32(256 + 20 * page))).sum();
+    let pages: u64 = (0..3).map(|page| u64::from(Bytes(&Forgery::new().bytes).u32(256 + 16 * page))).sum();
     assert_eq!(
         Forgery::new().u64(header::PAGES_OFFSET, len).refused(),
         format!("the last page ends at byte {} but the file has {len}", len + pages)
     );
     // Whatever a store claims to hold, sums of offsets do not wrap.
-    let skeleton = &Forgery::new().bytes[SKELETON..][..188];
+    let skeleton = &Forgery::new().bytes[SKELETON..][..176];
     Skeleton::parse(skeleton, u64::MAX - 5, u64::MAX).unwrap();
     assert!(Skeleton::parse(skeleton, u64::MAX - 5, u64::MAX - 1).is_err());
 }

@@ -8,4 +8,5 @@ mod hostile_skeleton;
 mod round_trip;
 mod sample;
 mod stranger;
+mod stranger_pages;
 mod tree;

@@ -1,9 +1,11 @@
 //! What was written comes back: root, metadata, every node, and by the pointers every parent and child.
 
 use crate::stranger;
-use crate::tree::{Growth, Random, Tree, metadata, open, page_ids, root};
+use crate::tree::{Growth, Layout, Random, Tree, metadata, open, page_ids, root};
 use gigalod_format::splats::page::MAX_NODES;
-use gigalod_format::splats::{Children, Node, Page, PageContents, PageId, PageRecord, SplatFile, WordIndex};
+use gigalod_format::splats::{
+    Children, FamilyPlace, Link, Node, Page, PageContents, PageId, PageRecord, SplatFile, WordIndex,
+};
 use gigalod_format::{Bounds, Container, FileStore, MemoryStore, Metadata, PageStore};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -31,13 +33,14 @@ fn follow(file: &SplatFile, tree: &Tree) -> usize {
         if found.iter().all(|node| node.is_leaf()) {
             continue;
         }
-        let mut family = pages[page.0 as usize].family(words[end]);
+        let family = pages[page.0 as usize].family(words[end]);
         crossing += usize::from(family.page != page);
+        let mut word = pages[family.page.0 as usize].family_word(family.family).unwrap();
         for (index, node) in group.iter().zip(found) {
             if !node.is_leaf() {
-                stack.push((tree.nodes[*index].children.clone(), family.page, family.word));
+                stack.push((tree.nodes[*index].children.clone(), family.page, word));
             }
-            family.word.0 += node.children().words() as u16;
+            word.0 += node.children().words() as u16;
         }
     }
     assert_eq!(visited, tree.nodes.len());
@@ -51,18 +54,26 @@ fn trees() -> impl Strategy<Value = Tree> {
         .prop_map(|(inner, growth, has_colors, seed)| Tree::grow(inner, growth, has_colors, &mut Random(seed)))
 }
 
+fn layouts() -> impl Strategy<Value = Layout> {
+    (16usize..200, prop::option::of(any::<u64>()), any::<bool>()).prop_map(|(page_nodes, shuffle, coded)| Layout {
+        page_nodes,
+        shuffle,
+        coded,
+    })
+}
+
 proptest! {
     #[test]
-    fn pointers_lead_from_every_parent_to_its_children(tree in trees(), page_nodes in 16usize..200) {
-        let file = open(&tree.write(page_nodes)).unwrap();
+    fn pointers_lead_from_every_parent_to_its_children(tree in trees(), layout in layouts()) {
+        let file = open(&tree.write_with(layout, &root(&tree), &metadata(&tree))).unwrap();
         prop_assert_eq!(*file.skeleton().root(), root(&tree));
         prop_assert_eq!(file.container().read_metadata().unwrap(), metadata(&tree));
         follow(&file, &tree);
     }
 
     #[test]
-    fn a_reader_made_from_the_document_alone_sees_the_same(tree in trees(), page_nodes in 16usize..200) {
-        let bytes = tree.write(page_nodes);
+    fn a_reader_made_from_the_document_alone_sees_the_same(tree in trees(), layout in layouts()) {
+        let bytes = tree.write_with(layout, &root(&tree), &metadata(&tree));
         prop_assert_eq!(stranger::read(&bytes), stranger::expected(&tree, root(&tree).sphere));
     }
 
@@ -71,7 +82,7 @@ proptest! {
         let tree = Tree::grow(1, Growth::Oldest, false, &mut Random(1));
         let [a, b, c, d, e, f] = bounds;
         let metadata = Metadata { bounds: Bounds { min: [a, b, c], max: [d, e, f] }, ..metadata(&tree) };
-        let file = open(&tree.write_with(16, &root(&tree), &metadata)).unwrap();
+        let file = open(&tree.write_with(Layout::default(), &root(&tree), &metadata)).unwrap();
         prop_assert_eq!(file.container().read_metadata().unwrap(), metadata);
     }
 
@@ -80,12 +91,24 @@ proptest! {
         let mut random = Random(seed);
         let count: usize = sizes.iter().map(|size| usize::from(*size)).sum();
         let nodes: Vec<Node> = (0..count).map(|_| Node(random.below(1 << 32) as u32)).collect();
-        let colors = if has_colors { nodes.iter().map(|node| node.0 as u16).collect() } else { Vec::new() };
-        let contents = PageContents { group_sizes: sizes, nodes, colors };
-        let record = PageRecord {
-            bytes: 0, checksum: 0, first_child_page: PageId(0), first_child_word: WordIndex(0),
-            nodes: contents.nodes.len() as u16, words: 0, codec: 0,
+        let mut contents = PageContents {
+            colors: if has_colors { nodes.iter().map(|node| node.0 as u16).collect() } else { Vec::new() },
+            family_groups: sizes.chunks(1 + random.below(4)).map(|family| family.len() as u8).collect(),
+            group_sizes: sizes,
+            nodes,
+            ..PageContents::default()
         };
+        for _ in 0..random.below(17) {
+            contents.runs.push(FamilyPlace { page: PageId(random.below(1 << 32) as u32), family: random.below(1 << 16) as u16 });
+        }
+        for _ in 0..random.below(count + 1) {
+            contents.links.push(Link { run: random.below(16) as u8, skip: random.below(4096) as u16 });
+        }
+        let record = PageRecord {
+            bytes: 0, checksum: 0, nodes: count as u16, words: contents.words() as u16,
+            families: contents.family_groups.len() as u16, codec: 0,
+        };
+        prop_assert_eq!(contents.encode().len(), contents.raw_bytes());
         let decoded = PageContents::decode_raw(&contents.encode(), &record, has_colors, PageId(0)).unwrap();
         prop_assert_eq!(decoded, contents);
     }
@@ -96,7 +119,8 @@ fn large_trees_take_several_full_pages_and_families_cross_them() {
     for (growth, has_colors) in [(Growth::Random, true), (Growth::Oldest, false), (Growth::Newest, true)] {
         let tree = Tree::grow(8_000, growth, has_colors, &mut Random(3));
         assert!(tree.nodes.len() > 20_000);
-        let bytes = tree.write(MAX_NODES);
+        let layout = Layout { page_nodes: MAX_NODES, coded: matches!(growth, Growth::Oldest), ..Layout::default() };
+        let bytes = tree.write_with(layout, &root(&tree), &metadata(&tree));
         let file = open(&bytes).unwrap();
         assert_eq!(file.skeleton().pages().len(), tree.nodes.len().div_ceil(MAX_NODES));
         assert!(file.skeleton().pages()[0].nodes > 8192 - 16, "pages are as full as families allow");
@@ -133,7 +157,7 @@ fn opening_reads_header_and_skeleton_and_nothing_else() {
     let store = Arc::new(MemoryStore::new(bytes));
     let file = SplatFile::open(Container::open(store.clone()).unwrap()).unwrap();
     let pages = file.skeleton().pages().len() as u64;
-    assert_eq!(store.bytes_read(), 128 + 128 + 20 * pages);
+    assert_eq!(store.bytes_read(), 128 + 128 + 16 * pages);
     file.read_page(PageId(0)).unwrap();
-    assert_eq!(store.bytes_read(), 256 + 20 * pages + u64::from(file.skeleton().pages()[0].bytes));
+    assert_eq!(store.bytes_read(), 256 + 16 * pages + u64::from(file.skeleton().pages()[0].bytes));
 }

@@ -2,9 +2,10 @@
 //!
 //! The oracle of the round trips: it shares no table, no checksum and no arithmetic with what it checks.
 
+use crate::stranger_pages::{Counts, Model, coded, raw};
 use crate::tree::Tree;
 use gigalod_geom::Sphere;
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 
 /// A node as the document defines it: its sphere is compared bit for bit.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,8 +84,7 @@ pub(crate) fn child_ball(center: [f32; 3], radius: f32, (s, corner): (i64, [i64;
     (child, radius * (s as f32 / 13.0))
 }
 
-/// All nodes, breadth first. Instead of deriving pointers it walks the pages in order and knows who comes next; that the
-/// pointers agree is what `round_trip::follow` checks.
+/// All nodes, breadth first from the root: by the links, as the document resolves them.
 pub(crate) fn read(bytes: &[u8]) -> Vec<Seen> {
     let file = Bytes(bytes);
     assert_eq!(&bytes[..8], [0x89, b'G', b'L', b'O', b'D', 0x0D, 0x0A, 0x1A]);
@@ -93,46 +93,80 @@ pub(crate) fn read(bytes: &[u8]) -> Vec<Seen> {
     let skeleton = file.u64(32);
     file.check(skeleton, file.u64(40), file.u32(48));
     file.check(file.u64(56), file.u64(64), file.u32(52));
+    let page_count = file.u64(skeleton + 108);
+    let records = skeleton + 128;
+    let model_bytes = u64::from(file.u32(skeleton + 124));
+    assert_eq!(file.u64(40), 128 + 16 * page_count + model_bytes);
+    let model = &bytes[(records + 16 * page_count) as usize..][..model_bytes as usize];
+    let model = (model_bytes > 0).then(|| Model::read(model));
+
+    let has_colors = file.u32(skeleton + 120) & 1 != 0;
+    let mut page = file.u64(72);
+    let mut pages = Vec::new();
+    for record in (0..page_count).map(|number| records + 16 * number) {
+        let page_bytes = u64::from(file.u32(record));
+        file.check(page, page_bytes, file.u32(record + 4));
+        let [nodes, words, families] = [8, 10, 12].map(|at| usize::from(file.u16(record + at)));
+        let counts = Counts { nodes, words, families, has_colors };
+        let bytes = &bytes[page as usize..][..page_bytes as usize];
+        pages.push(match file.0[record as usize + 14] {
+            0 => raw(bytes, counts),
+            1 => coded(bytes, counts, model.as_ref().unwrap()),
+            codec => panic!("codec {codec}"),
+        });
+        page += page_bytes;
+    }
+    // Where the family below each group lies that has one.
+    let mut below = HashMap::new();
+    for (number, page) in pages.iter().enumerate() {
+        let mut cursors: Vec<(usize, usize)> =
+            page.runs.iter().map(|(page, family)| (*page as usize, usize::from(*family))).collect();
+        let mut links = page.links.iter();
+        for (family, groups) in page.families.iter().enumerate() {
+            for (group, nodes) in groups.iter().enumerate() {
+                if nodes.iter().any(|(bits, _)| bits & 6 != 0) {
+                    let (run, skip) = links.next().unwrap();
+                    let cursor = &mut cursors[usize::from(*run)];
+                    cursor.1 += usize::from(*skip);
+                    while cursor.1 >= pages[cursor.0].families.len() {
+                        *cursor = (cursor.0 + 1, cursor.1 - pages[cursor.0].families.len());
+                    }
+                    assert!(*cursor > (number, family), "forwards");
+                    assert!(below.insert((number, family, group), *cursor).is_none());
+                    cursor.1 += 1;
+                }
+            }
+        }
+        assert_eq!(links.next(), None);
+    }
 
     let codes = sphere_codes();
     let root = ([24, 28, 32].map(|at| file.f32(skeleton + at)), file.f32(skeleton + 36));
-    let has_colors = file.u32(skeleton + 120) & 1 != 0;
-    let mut next_parents: VecDeque<(([f32; 3], f32), u32)> = VecDeque::new();
+    // The groups to come: where they are, and the decoded ball and number of children of their parents.
+    let mut next = VecDeque::from([((0, 0, 0), None)]);
     let mut seen = Vec::new();
-    let mut page = file.u64(72);
-    for number in 0..file.u64(skeleton + 108) {
-        let record = skeleton + 128 + 20 * number;
-        let (page_bytes, nodes) = (u64::from(file.u32(record)), u64::from(file.u16(record + 14)));
-        file.check(page, page_bytes, file.u32(record + 4));
-        let groups = u64::from(file.u32(page));
-        let first_node = page + 4 + groups.div_ceil(4);
-        let mut node_at = 0;
-        for group in 0..groups {
-            let size = u32::from(bytes[(page + 4 + group / 4) as usize] >> (group % 4 * 2) & 3) + 1;
-            let parent = if seen.is_empty() { None } else { next_parents.pop_front() };
-            for _ in 0..size {
-                let bits = file.u32(first_node + 4 * node_at);
-                let ball = match parent {
-                    None => root,
-                    Some(((center, radius), announced)) => {
-                        assert_eq!(announced, size);
-                        child_ball(center, radius, codes[(bits >> 19) as usize])
-                    }
-                };
-                let children = if bits >> 1 & 3 == 0 { 0 } else { (bits >> 1 & 3) + 1 };
-                if children > 0 {
-                    next_parents.push_back((ball, children));
+    while let Some(((page, family, group), parent)) = next.pop_front() {
+        let nodes = &pages[page].families[family][group];
+        let mut child_group = 0;
+        for (bits, color) in nodes {
+            let ball = match parent {
+                None => root,
+                Some(((center, radius), announced)) => {
+                    assert_eq!(announced, nodes.len());
+                    child_ball(center, radius, codes[(bits >> 19) as usize])
                 }
-                let color = has_colors.then(|| file.u16(first_node + 4 * nodes + 2 * node_at));
-                let (normal, cone) = (bits >> 5 & 0x3FFF, bits >> 3 & 3);
-                seen.push(Seen { center: ball.0, radius: ball.1, normal, cone, color, children });
-                node_at += 1;
+            };
+            let children = if bits >> 1 & 3 == 0 { 0 } else { (bits >> 1 & 3) + 1 };
+            if children > 0 {
+                let (page, family) = below[&(page, family, group)];
+                next.push_back(((page, family, child_group), Some((ball, children as usize))));
+                child_group += 1;
             }
+            let (normal, cone) = (bits >> 5 & 0x3FFF, bits >> 3 & 3);
+            seen.push(Seen { center: ball.0, radius: ball.1, normal, cone, color: *color, children });
         }
-        assert_eq!(node_at, nodes);
-        page += page_bytes;
     }
-    assert!(next_parents.is_empty(), "groups are missing");
+    assert_eq!(seen.len() as u64, file.u64(skeleton + 92), "groups are missing, or appear twice");
     seen
 }
 

@@ -1,7 +1,10 @@
-//! Trees to be written, and a slow, obvious writer: breadth-first, families into pages.
+//! Trees to be written, and a slow, obvious writer: families in some order, then into pages.
 
-use gigalod_format::splats::page::CODEC_RAW;
-use gigalod_format::splats::{Children, Node, PageContents, PageId, PageRecord, Root, Skeleton, SplatFile, WordIndex};
+use gigalod_format::splats::codec::{self, Encoder, Model, Statistics};
+use gigalod_format::splats::page::{CODEC_ENTROPY, CODEC_RAW};
+use gigalod_format::splats::{
+    Children, FamilyPlace, Linker, Node, PageContents, PageId, PageRecord, Root, Skeleton, SplatFile,
+};
 use gigalod_format::{Bounds, Container, FormatError, InputCounts, Kind, MemoryStore, Metadata, Writer};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::quantise::{normal, sphere};
@@ -102,71 +105,33 @@ impl Tree {
         unreachable!("a tree ends")
     }
 
-    /// A file whose pages hold at most `page_nodes` nodes (at least 16: a family must fit), and the parts it is made of.
+    /// A file of raw pages that hold at most `page_nodes` nodes (at least 16: a family must fit), breadth first.
     pub(crate) fn write(&self, page_nodes: usize) -> Vec<u8> {
-        self.write_with(page_nodes, &root(self), &metadata(self))
+        self.write_with(Layout { page_nodes, ..Layout::default() }, &root(self), &metadata(self))
     }
 
-    /// The same with a root and metadata of the caller's.
-    pub(crate) fn write_with(&self, page_nodes: usize, root: &Root, metadata: &Metadata) -> Vec<u8> {
-        // All families, breadth first, and for each group the number of the family below it.
-        let mut families = vec![vec![vec![0]]];
-        let mut below = BTreeMap::new();
-        let mut at = 0;
-        while at < families.len() {
-            for (place, group) in families[at].clone().iter().enumerate() {
-                let family = self.family_of(group);
-                if !family.is_empty() {
-                    below.insert((at, place), families.len());
-                    families.push(family);
-                }
-            }
-            at += 1;
-        }
-        // Where each family begins.
-        let (mut pages, mut starts) = (vec![Vec::new()], Vec::new());
-        let (mut nodes, mut words) = (0, 0);
-        for (number, family) in families.iter().enumerate() {
-            let more: usize = family.iter().map(Vec::len).sum();
-            if nodes + more > page_nodes {
-                pages.push(Vec::new());
-                (nodes, words) = (0, 0);
-            }
-            starts.push((PageId(pages.len() as u32 - 1), WordIndex(words as u16)));
-            pages.last_mut().expect("one page at least").push(number);
-            nodes += more;
-            words += more + (0..family.len()).filter(|place| below.contains_key(&(number, *place))).count();
-        }
-
-        let (mut records, mut encoded) = (Vec::new(), Vec::new());
-        for page in &pages {
-            let mut contents = PageContents::default();
-            let mut families_below: Vec<usize> = Vec::new();
-            for number in page {
-                for (place, group) in families[*number].iter().enumerate() {
-                    contents.group_sizes.push(group.len() as u8);
-                    contents.nodes.extend(group.iter().map(|index| self.packed(*index)));
-                    if self.has_colors {
-                        contents.colors.extend(group.iter().map(|index| self.nodes[*index].color));
-                    }
-                    families_below.extend(below.get(&(*number, place)));
-                }
-            }
-            let bytes = contents.encode();
-            let start = families_below.first().map_or((PageId(0), WordIndex(0)), |family| starts[*family]);
-            records.push(PageRecord {
-                bytes: bytes.len() as u32,
-                checksum: gigalod_format::checksum(&bytes),
-                first_child_page: start.0,
-                first_child_word: start.1,
-                nodes: contents.nodes.len() as u16,
-                words: (contents.nodes.len() + families_below.len()) as u16,
-                codec: CODEC_RAW,
-            });
-            encoded.push(bytes);
-        }
-
-        let skeleton = Skeleton::encode(root, &records, None);
+    /// The same with another layout, a root and metadata of the caller's.
+    pub(crate) fn write_with(&self, layout: Layout, root: &Root, metadata: &Metadata) -> Vec<u8> {
+        let pages = self.pages(layout);
+        let mut statistics = Statistics::default();
+        pages.iter().for_each(|page| codec::count(page, &mut statistics));
+        let model = layout.coded.then(|| Model::of(&statistics));
+        let mut encoder = model.as_ref().map(Encoder::new);
+        let encoded: Vec<Vec<u8>> = pages
+            .iter()
+            .map(|page| encoder.as_mut().map_or_else(|| page.encode(), |coder| coder.encode(page)))
+            .collect();
+        let record = |(page, bytes): (&PageContents, &Vec<u8>)| PageRecord {
+            bytes: bytes.len() as u32,
+            checksum: gigalod_format::checksum(bytes),
+            nodes: page.nodes.len() as u16,
+            words: page.words() as u16,
+            families: page.family_groups.len() as u16,
+            codec: if layout.coded { CODEC_ENTROPY } else { CODEC_RAW },
+        };
+        let records: Vec<PageRecord> = pages.iter().zip(&encoded).map(record).collect();
+        let skeleton = Skeleton::encode(root, &records, model.as_ref());
+        assert_eq!(skeleton.len() as u64, Skeleton::encoded_bytes(records.len() as u64, model.as_ref()));
         let mut writer = Writer::new(Cursor::new(Vec::new()), Kind::Splats, skeleton.len() as u64).unwrap();
         for page in &encoded {
             writer.page(page).unwrap();
@@ -175,14 +140,78 @@ impl Tree {
         assert_eq!(out.get_ref().len() as u64, file_bytes);
         out.into_inner()
     }
+
+    /// All pages of a file.
+    pub(crate) fn pages(&self, layout: Layout) -> Vec<PageContents> {
+        // All families in the order of the file, and for each group the number of the family below it.
+        let mut random = layout.shuffle.map(Random);
+        let mut open = VecDeque::from([(vec![vec![0]], None)]);
+        let (mut families, mut below) = (Vec::new(), BTreeMap::new());
+        while !open.is_empty() {
+            let at = random.as_mut().map_or(0, |random| random.below(open.len()));
+            let (family, above) = open.remove(at).unwrap();
+            let number = families.len() as u64;
+            if let Some(above) = above {
+                below.insert(above, number);
+            }
+            for (place, group) in family.iter().enumerate() {
+                let family = self.family_of(group);
+                if !family.is_empty() {
+                    open.push_back((family, Some((number, place))));
+                }
+            }
+            families.push(family);
+        }
+        // Pages and the families that their runs begin at.
+        let (mut pages, mut places) = (Vec::<(PageContents, Vec<u64>)>::new(), Vec::new());
+        let (mut page, mut linker) = (PageContents::default(), Linker::default());
+        for (family, number) in families.iter().zip(0u64..) {
+            let more: usize = family.iter().map(Vec::len).sum();
+            let targets = (0..family.len()).filter_map(|place| below.get(&(number, place)).copied());
+            let fits = page.nodes.len() + more <= layout.page_nodes;
+            if !fits || !linker.push(targets.clone(), &mut page.links) {
+                pages.push((std::mem::take(&mut page), linker.starts().to_vec()));
+                linker.clear();
+                assert!(linker.push(targets, &mut page.links), "a family fits an empty page");
+            }
+            places.push(FamilyPlace { page: PageId(pages.len() as u32), family: page.family_groups.len() as u16 });
+            page.family_groups.push(family.len() as u8);
+            for group in family {
+                page.group_sizes.push(group.len() as u8);
+                page.nodes.extend(group.iter().map(|index| self.packed(*index)));
+                page.colors.extend(group.iter().filter(|_| self.has_colors).map(|index| self.nodes[*index].color));
+            }
+        }
+        pages.push((page, linker.starts().to_vec()));
+        let placed = |(mut page, starts): (PageContents, Vec<u64>)| {
+            page.runs = starts.iter().map(|start| places[*start as usize]).collect();
+            page
+        };
+        pages.into_iter().map(placed).collect()
+    }
 }
 
-/// A leaf that can be told from all others by what is stored: 7621 and 16224 have no common factor.
+/// How a tree becomes pages.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub(crate) page_nodes: usize,
+    /// Families in any order that the format allows, by this seed; else breadth first.
+    pub(crate) shuffle: Option<u64>,
+    pub(crate) coded: bool,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self { page_nodes: 16, shuffle: None, coded: false }
+    }
+}
+
+/// A leaf that can hardly be taken for another by what is stored; normals move a little, and now and then to another face.
 fn marked(index: usize) -> TreeNode {
     TreeNode {
         children: Vec::new(),
         sphere: (index * 4099 % sphere::CODES) as u16,
-        normal: (index % normal::CODES) as u16,
+        normal: ((index * 37 + index / 7 % 6 * 2704) % normal::CODES) as u16,
         cone: (index % 4) as u8,
         color: (index * 40_503) as u16,
     }

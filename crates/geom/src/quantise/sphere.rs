@@ -123,21 +123,54 @@ pub fn decode_with(table: &[Relative], parent: &Sphere, code: u16) -> Sphere {
 ///
 /// `parent` is decoded and must enclose `child`; where it does not (a caller's bug), the parent itself is returned.
 pub fn encode(parent: &Sphere, child: &Sphere) -> (u16, Sphere) {
+    // A ball whose centre is too far off cannot enclose the child: seen without looking anything up.
+    let is_near = |off: f32, slack: f32| off <= slack;
+    smallest(parent, child, is_near, |decoded| decoded.encloses(child))
+}
+
+/// The code with a small sphere that encloses all of `child` that lies in `bound`, and that sphere.
+///
+/// `parent` is decoded and must enclose `bound`. `child` may stick out: where all that it stands for lies in `bound` too, what
+/// sticks out is empty. Of each size one place is tried, the one that is nearest to the child.
+pub fn encode_within(parent: &Sphere, bound: &Sphere, child: &Sphere) -> (u16, Sphere) {
+    if bound.encloses(child) {
+        return encode(parent, child);
+    }
+    smallest(parent, child, |_, _| true, |decoded| decoded.encloses_common(child, bound))
+}
+
+/// Tries sizes from small to large. `may` is asked first, with the squares of how far the centre is off and of how far it may be, in
+/// cells.
+#[inline(always)]
+fn smallest(
+    parent: &Sphere,
+    child: &Sphere,
+    may: impl Fn(f32, f32) -> bool,
+    encloses: impl Fn(&Sphere) -> bool,
+) -> (u16, Sphere) {
     let tables = &*TABLES;
     if parent.radius > 0.0 {
         let scale = GRID as f32 / parent.radius;
         let center = (child.center - parent.center) * scale;
-        let least = ((child.radius * scale).ceil()).clamp(1.0, GRID as f32);
-        for s in least as usize..GRID {
-            let places = (GRID + 1 - s) as f32;
-            // Nearest corner on each axis: centre = 2 · corner + s − 13. Truncation rounds what is not negative down.
-            let corner = ((center + (GRID as f32 - s as f32)) * 0.5).clamp(Vec3::ZERO, Vec3::splat(places - 1.0));
-            let [x, y, z] = corner.to_array().map(|at| (at + 0.5) as usize);
+        let radius = child.radius * scale;
+        // The smallest size that is not smaller than the child.
+        let least = (radius as usize + usize::from(radius > radius as usize as f32)).clamp(1, GRID);
+        for s in least..GRID {
             let places = GRID + 1 - s;
+            let shift = GRID as f32 - s as f32;
+            // Nearest corner on each axis: centre = 2 · corner + s − 13. Truncation rounds what is not negative down.
+            let corner = ((center + shift) * 0.5).clamp(Vec3::ZERO, Vec3::splat((places - 1) as f32));
+            let [x, y, z] = corner.to_array().map(|at| (at + 0.5) as usize);
+            let found = Vec3::new(x as f32, y as f32, z as f32) * 2.0 - shift;
+            // A thousandth of a cell is more than these roundings.
+            let slack = s as f32 - radius + 1e-3;
+            if !may((found - center).length_squared(), slack * slack) {
+                continue;
+            }
             let code = tables.code[tables.first[s] + (x * places + y) * places + z];
             if code != NONE {
                 let decoded = decode_with(&tables.relative, parent, code);
-                if decoded.encloses(child) {
+                if encloses(&decoded) {
                     return (code, decoded);
                 }
             }

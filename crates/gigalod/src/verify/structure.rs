@@ -1,14 +1,13 @@
-//! Every page, every group, every tree bit of a splat file, in breadth-first order.
+//! Every page, every group, every tree bit of a splat file, in the order of the file.
 //!
 //! Takes an open file; returns the problems and, if there are none, the tree with its decoded spheres. Memory: a
 //! [`TreeNode`] for each node, for the tree is what the measurements need.
 
 use super::Problems;
-use gigalod_format::splats::page::FamilyStart;
-use gigalod_format::splats::{Children, Node, PageContents, PageId, SplatFile, WordIndex};
+use gigalod_format::splats::{Children, FamilyPlace, Node, PageContents, PageId, SplatFile, WordIndex};
 use gigalod_geom::Sphere;
-use gigalod_geom::quantise::{cone, normal, sphere};
-use std::collections::VecDeque;
+use gigalod_geom::quantise::{normal, sphere};
+use std::collections::HashMap;
 
 /// A node of a checked tree.
 #[derive(Clone, Copy, Debug)]
@@ -23,36 +22,24 @@ pub struct TreeNode {
     pub node: Node,
 }
 
-/// A whole tree, breadth first: the root is node 0.
+/// A whole tree: the root is node 0.
 #[derive(Clone, Debug, Default)]
 pub struct SplatTree {
     /// Parents before children.
     pub nodes: Vec<TreeNode>,
 }
 
-/// What the breadth-first order says must come next.
-struct ExpectedGroup {
-    /// Index of the parent in the tree; none for the root's group.
-    parent: Option<u32>,
-    children: Children,
-    /// Number of the family it belongs to.
-    family: u64,
-}
+/// A family that some group points to: its groups' parents, by their index in the tree.
+type Parents = [Option<u32>; 4];
 
-/// Reads all of `file` and checks checksums, sizes, tree bits, page links and cones. `progress` is told the pages done.
+/// Reads all of `file` and checks checksums, sizes, tree bits and page links. `progress` is told the pages done.
 pub fn check(file: &SplatFile, progress: &mut dyn FnMut(u64)) -> (SplatTree, Problems) {
+    let root = FamilyPlace { page: PageId(0), family: 0 };
     let mut walk = Walk {
         file,
         tree: SplatTree::default(),
         problems: Problems::default(),
-        expected: VecDeque::from([ExpectedGroup {
-            parent: None,
-            children: Children { count: 1, all_leaves: file.skeleton().root().nodes == 1 },
-            family: 0,
-        }]),
-        families: 1,
-        begun_families: 0,
-        claims: VecDeque::new(),
+        announced: HashMap::from([(root, Parents::default())]),
     };
     for number in 0..file.skeleton().pages().len() as u32 {
         if !walk.page(PageId(number)) {
@@ -67,22 +54,21 @@ struct Walk<'a> {
     file: &'a SplatFile,
     tree: SplatTree,
     problems: Problems,
-    expected: VecDeque<ExpectedGroup>,
-    /// Families announced and begun so far.
-    families: u64,
-    begun_families: u64,
-    /// Pages whose record says where a family begins that is still to come.
-    claims: VecDeque<(u64, PageId, FamilyStart)>,
+    /// Families that are still to come.
+    announced: HashMap<FamilyPlace, Parents>,
 }
 
 impl Walk<'_> {
     /// False where nothing after this page can be understood.
     fn page(&mut self, page: PageId) -> bool {
         // Checksum, sizes and links as every reader checks them; then the contents once more by themselves.
-        if let Err(error) = self.file.read_page(page) {
-            self.problems.add(|| error.to_string());
-            return false;
-        }
+        let decoded = match self.file.read_page(page) {
+            Ok(decoded) => decoded,
+            Err(error) => {
+                self.problems.add(|| error.to_string());
+                return false;
+            }
+        };
         let record = *self.file.skeleton().record(page);
         let mut bytes = vec![0; record.bytes as usize];
         let read = self.file.container().store().read_at(self.file.skeleton().page_offset(page), &mut bytes);
@@ -100,100 +86,91 @@ impl Walk<'_> {
                 return false;
             }
         };
-        let (mut at, mut word, mut has_family) = (0, 0u32, false);
-        for size in &contents.group_sizes {
-            let nodes = &contents.nodes[at..at + usize::from(*size)];
-            at += usize::from(*size);
-            let Some(group) = self.expected.pop_front() else {
-                self.problems.add(|| format!("page {page}: a group of {size} nodes that no parent announced"));
+        let (mut at, mut word) = (0, 0);
+        let mut groups = contents.group_sizes.iter();
+        for (family, group_count) in contents.family_groups.iter().enumerate() {
+            let here = FamilyPlace { page, family: family as u16 };
+            let Some(parents) = self.announced.remove(&here) else {
+                self.problems.add(|| format!("page {page}: no group before it, or two, lead to family {family}"));
                 return false;
             };
-            if group.children.count != *size {
-                let expected = group.children.count;
-                self.problems.add(|| format!("page {page}: a group of {size} nodes, its parent announced {expected}"));
+            if decoded.family_word(here.family) != Some(WordIndex(word as u16)) {
+                self.problems.add(|| format!("page {page}: family {family} does not begin at word {word}"));
+            }
+            let expected = if at + word == 0 && page.0 == 0 { 1 } else { parents.iter().flatten().count() };
+            if expected != usize::from(*group_count) {
+                self.problems
+                    .add(|| format!("page {page}: family {family} has {group_count} groups, expected {expected}"));
                 return false;
             }
-            if group.family == self.begun_families {
-                self.begin_family(page, word);
+            for parent in parents.iter().take(expected) {
+                let size = usize::from(*groups.next().expect("sizes add up, as decoding has checked"));
+                let nodes = &contents.nodes[at..at + size];
+                (at, word) = (at + size, word + size);
+                let pointer = decoded.words().get(word).copied();
+                let has_pointer = nodes.iter().any(|node| !node.is_leaf());
+                if !self.group(nodes, *parent, pointer.filter(|_| has_pointer).map(|word| decoded.family(word)), page) {
+                    return false;
+                }
+                word += usize::from(has_pointer);
             }
-            let has_children = nodes.iter().any(|node| !node.is_leaf());
-            if has_children == group.children.all_leaves {
-                self.problems
-                    .add(|| format!("page {page}, word {word}: the parent says all are leaves: {}", !has_children));
-            }
-            if has_children && !has_family {
-                has_family = true;
-                let start = FamilyStart { page: record.first_child_page, word: record.first_child_word };
-                self.claims.push_back((self.families, page, start));
-            }
-            self.group(nodes, &group, page);
-            self.families += u64::from(has_children);
-            word += u32::from(*size) + u32::from(has_children);
         }
         true
     }
 
-    /// Checks that a family begins where the page above it says. (That it ends in the same page, `read_page` has checked.)
-    fn begin_family(&mut self, page: PageId, word: u32) {
-        let number = self.begun_families;
-        self.begun_families += 1;
-        let here = FamilyStart { page, word: WordIndex(word as u16) };
-        while let Some((_, from, claimed)) = self.claims.pop_front_if(|(claimed, _, _)| *claimed == number) {
-            if claimed != here {
-                self.problems.add(|| {
-                    format!("page {from}: its first family is said to begin at {claimed:?}, but does at {here:?}")
-                });
-            }
-        }
-    }
-
-    fn group(&mut self, nodes: &[Node], group: &ExpectedGroup, page: PageId) {
+    /// A group and the family below it, if any; false where it is not what its parent announced.
+    fn group(&mut self, nodes: &[Node], parent: Option<u32>, below: Option<FamilyPlace>, page: PageId) -> bool {
         let first = self.tree.nodes.len() as u32;
-        let parent = group.parent.map(|parent| {
+        let size = nodes.len() as u8;
+        let announced = match parent {
+            Some(parent) => self.tree.nodes[parent as usize].node.children(),
+            None => Children { count: 1, all_leaves: self.file.skeleton().root().nodes == 1 },
+        };
+        if announced.count != size {
+            let expected = announced.count;
+            self.problems.add(|| format!("page {page}: a group of {size} nodes, its parent announced {expected}"));
+            return false;
+        }
+        if below.is_some() == announced.all_leaves {
+            self.problems.add(|| format!("page {page}: the parent says all are leaves: {}", announced.all_leaves));
+        }
+        let parent = parent.map(|parent| {
             self.tree.nodes[parent as usize].first_child = first;
             self.tree.nodes[parent as usize]
         });
+        let (mut parents, mut groups) = (Parents::default(), 0);
         for node in nodes {
             if usize::from(node.sphere()) >= sphere::CODES || usize::from(node.normal()) >= normal::CODES {
                 self.problems
                     .add(|| format!("page {page}: sphere code {}, normal code {}", node.sphere(), node.normal()));
             }
-            let ball = match &parent {
+            let sphere = match &parent {
                 Some(parent) => sphere::decode(&parent.sphere, node.sphere()),
                 None => self.file.skeleton().root().sphere,
             };
-            if let Some(parent) = &parent {
-                self.check_cone(parent.node, *node, page);
+            let children = node.children().count;
+            if children > 0 {
+                parents[groups] = Some(self.tree.nodes.len() as u32);
+                groups += 1;
             }
-            let children = node.children();
-            let index = self.tree.nodes.len() as u32;
-            if children.count > 0 {
-                self.expected.push_back(ExpectedGroup { parent: Some(index), children, family: self.families });
-            }
-            self.tree.nodes.push(TreeNode { sphere: ball, first_child: 0, children: children.count, node: *node });
+            self.tree.nodes.push(TreeNode { sphere, first_child: 0, children, node: *node });
         }
-    }
-
-    /// A child's cone must lie within its parent's, or culling by the parent's would hide what can be seen.
-    fn check_cone(&mut self, parent: Node, child: Node, page: PageId) {
-        if parent.cone() == 3 {
-            return;
+        if let Some(below) = below
+            && self.announced.insert(below, parents).is_some()
+        {
+            self.problems
+                .add(|| format!("page {page}: a second group leads to family {} of page {}", below.family, below.page));
+            return false;
         }
-        let angle = |cos: f32| f64::from(cos.clamp(-1.0, 1.0)).acos();
-        let between =
-            normal::decode(parent.normal()).as_dvec3().angle_between(normal::decode(child.normal()).as_dvec3());
-        let excess = between + angle(cone::cosine(child.cone())) - angle(cone::cosine(parent.cone()));
-        if excess > 1e-3 {
-            self.problems.add(|| format!("page {page}: a normal cone sticks out of its parent's by {excess} radian"));
-        }
+        true
     }
 
     fn finish(mut self) -> (SplatTree, Problems) {
         let root = self.file.skeleton().root();
         if self.problems.count == 0 {
-            if !self.expected.is_empty() {
-                let missing = self.expected.len();
-                self.problems.add(|| format!("{missing} groups of nodes are announced but not there"));
+            if !self.announced.is_empty() {
+                let missing = self.announced.len();
+                self.problems.add(|| format!("{missing} families of nodes are announced but not there"));
             }
             let leaves = self.tree.nodes.iter().filter(|node| node.children == 0).count() as u64;
             let found = (self.tree.nodes.len() as u64, leaves);

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 /// Phases that can be gone on after, as journals name them, in order.
-pub(crate) const PHASES: [&str; 5] = ["read", "leaves", "part of tree", "tree", "quantise"];
+pub(crate) const PHASES: [&str; 4] = ["read", "leaves", "part of tree", "tree"];
 
 /// So often a build is begun anew that was over before it could be killed: then the machine is too fast for that.
 pub(crate) const TRIES: usize = 100;

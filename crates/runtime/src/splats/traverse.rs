@@ -89,6 +89,9 @@ struct Group {
     inside: bool,
     /// The parent wholly faces the eye, or backfaces are not to be culled at all.
     toward: bool,
+    /// The parent wholly faces away, and is visited nevertheless. A node's own cone may be wider than its parent's allows it to
+    /// be, so what is known of the parent is remembered.
+    away: bool,
 }
 
 /// Cuts one hierarchy for one view.
@@ -145,6 +148,7 @@ pub fn cut(input: &SelectInput<'_>, cutting: &Cutting, work: &mut Work, sink: &m
         count: 1,
         inside: !cutting.frustum_culling,
         toward: !hides_backs,
+        away: false,
     });
     while let Some(group) = work.stack.pop() {
         if !traversal.visit(&group, &mut work.stack, sink) {
@@ -184,7 +188,9 @@ impl Traversal<'_> {
             return false;
         }
         // The group's pointer follows it, if any of its nodes has children.
-        let mut family = page.words().get(end).map(|word| page.family(*word));
+        let family = page.words().get(end).map(|word| page.family(*word));
+        // Words of the family that lie before the group below the node at hand.
+        let mut before = 0;
         for (at, word) in words.iter().enumerate() {
             let node = Node(*word);
             let children = node.children();
@@ -198,12 +204,10 @@ impl Traversal<'_> {
                 level: u32::from(group.level),
                 place: (group.page, WordIndex((start + at) as u16)),
             };
-            let below = family;
-            if let Some(family) = &mut family {
-                family.word.0 = family.word.0.saturating_add(children.words() as u16);
-            }
+            let skipped = before;
+            before += children.words() as u16;
 
-            let (mut inside, mut toward) = (group.inside, group.toward);
+            let (mut inside, mut toward, mut away) = (group.inside, group.toward, group.away);
             let padded = ball.radius * self.overhang;
             if !inside {
                 match self.input.view.frustum.side(center_in_eye, padded) {
@@ -216,15 +220,16 @@ impl Traversal<'_> {
                     Side::Crossing => {}
                 }
             }
-            if !toward {
+            if !toward && !away {
                 match self.cone(node).facing(center_in_eye, padded) {
                     Facing::Away if self.backface_culling => {
                         self.report.culled_backface += 1;
                         sink.cull(&visited, Culled::Backface);
                         continue;
                     }
+                    Facing::Away => away = true,
                     Facing::Toward => toward = true,
-                    Facing::Away | Facing::Unsure => {}
+                    Facing::Unsure => {}
                 }
             }
 
@@ -239,18 +244,22 @@ impl Traversal<'_> {
             } else if children.count == 0 {
                 Some(Limit::Data)
             } else {
-                let Some(below) = below else {
+                let Some(below) = family else {
                     return false;
                 };
-                if self.residency.page(self.input.file, below.page).is_some() {
+                if let Some(page_below) = self.residency.page(self.input.file, below.page) {
+                    let Some(first) = page_below.family_word(below.family) else {
+                        return false;
+                    };
                     stack.push(Group {
                         parent: ball,
                         page: below.page,
-                        word: below.word,
+                        word: WordIndex(first.0.saturating_add(skipped)),
                         level: group.level.saturating_add(1),
                         count: children.count,
                         inside,
                         toward,
+                        away,
                     });
                     continue;
                 }
@@ -258,7 +267,8 @@ impl Traversal<'_> {
                 Some(Limit::Residency)
             };
             // Also with culling off, so that the picture is the same: hidden splats are not part of it.
-            if self.hides_backs && !toward && self.cone(node).faces_away(center_in_eye, ball.radius) {
+            let hidden = away || !toward && self.cone(node).faces_away(center_in_eye, ball.radius);
+            if self.hides_backs && hidden {
                 self.report.culled_backface += 1;
                 sink.cull(&visited, Culled::Backface);
                 continue;

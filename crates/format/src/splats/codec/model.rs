@@ -1,68 +1,117 @@
 //! Which table codes which symbol: the contexts of a page's fields, and their probabilities in one file.
 //!
 //! One model serves all pages of a file; it lies in the skeleton, so each page decodes by itself. The contexts are part of the
-//! format: `docs/format.md` lists them in this order.
+//! format: `docs/format.md` lists them in this order. In: counts, or the bytes of a model. Out: tables.
+//!
+//! What always holds: each symbol that is legal in a context has a frequency of at least 1 there, so any model codes any page;
+//! one that is not legal has none, so a decoder never sees it.
 
-use super::rans::{SYMBOLS, Slots, Table};
+use super::lister::Symbol;
+use super::rans::{ROW, SCALE, SYMBOLS, Slots, Table};
 use crate::FormatError;
 
 /// The first context of each field; each field's contexts are numbered from there.
 pub(super) mod first {
-    /// Size of a group less one. By the size of the group before (0 at the beginning).
-    pub(crate) const GROUP: usize = 0;
-    /// Tree bits, and the cone of a leaf. By place in the group (0–3), what the node before it in the group is (none, a leaf,
-    /// an inner node), and the cone before.
-    pub(crate) const KIND: usize = GROUP + 5;
-    /// Cone of an inner node. By the cone before.
-    pub(crate) const CONE: usize = KIND + 4 * 3 * 4;
-    /// Column of the normal, as a difference. By cone, and first of its group or not.
-    pub(crate) const COLUMN: usize = CONE + 4;
-    /// Row of the normal, as a difference. By cone, first or not, and size of the column's difference.
-    pub(crate) const ROW: usize = COLUMN + 4 * 2;
+    /// Tree bits, and whether the node is the last of its group. By place in the group and whether the node before is inner
+    /// (7), and the cone before.
+    pub(crate) const KIND: u32 = 0;
+    /// Cone, and how the normal's face lies to the one before. By leaf or inner, first of its group or not, the cone before, and
+    /// which border of its face the guess is near. 24 symbols, so each has two numbers.
+    pub(crate) const CONE_AND_FACE: u32 = KIND + 7 * 4;
+    /// How far column and row of the normal are from their guesses, in classes. By cone, first of its group or not, and whether
+    /// the face is that of the node before. Up to 46 symbols, so each has three numbers.
+    pub(crate) const CLASSES: u32 = CONE_AND_FACE + 2 * 2 * 4 * 5 * 2;
     /// Edge of the sphere's sub-cube less one. By leaf or not, and the edge before it in the group (0 for none).
-    pub(crate) const EDGE: usize = ROW + 4 * 2 * 4;
+    pub(crate) const EDGE: u32 = CLASSES + 4 * 2 * 2 * 3;
     /// Corner on the first axis along the surface. By edge, and where the siblings before lie on that axis.
-    pub(crate) const ALONG_1: usize = EDGE + 2 * 14;
+    pub(crate) const ALONG_1: u32 = EDGE + 2 * 14;
     /// Corner on the second axis along the surface. By edge, where the siblings lie, and how far out the first axis is.
-    pub(crate) const ALONG_2: usize = ALONG_1 + 13 * 6;
+    pub(crate) const ALONG_2: u32 = ALONG_1 + 13 * 6;
     /// Corner across the surface, as a difference from the tangent plane. By edge, and leaf or not.
-    pub(crate) const ACROSS: usize = ALONG_2 + 13 * 6 * 3;
+    pub(crate) const ACROSS: u32 = ALONG_2 + 13 * 6 * 3;
     /// Green, as a difference. By first of its group or not.
-    pub(crate) const GREEN: usize = ACROSS + 13 * 2;
+    pub(crate) const GREEN: u32 = ACROSS + 13 * 2;
     /// Red, as a difference. By size of green's.
-    pub(crate) const RED: usize = GREEN + 2;
+    pub(crate) const RED: u32 = GREEN + 2;
     /// Blue, as a difference. By size of green's.
-    pub(crate) const BLUE: usize = RED + 4;
-    /// Four bits as they are.
-    pub(crate) const PLAIN: usize = BLUE + 4;
+    pub(crate) const BLUE: u32 = RED + 4;
+    /// Groups of two families. By the groups of the family before.
+    pub(crate) const FAMILY: u32 = BLUE + 4;
+    /// Run of a link. By the run of the link before.
+    pub(crate) const RUN: u32 = FAMILY + 4;
+    /// Families that a link skips.
+    pub(crate) const SKIP: u32 = RUN + 16;
+    /// How many there are.
+    pub(crate) const END: u32 = SKIP + crate::splats::links::SKIP_CONTEXTS;
 }
 
-/// Number of contexts that a file stores; [`first::PLAIN`] comes after them and needs no storing.
-pub(super) const STORED: usize = first::PLAIN;
+/// Number of contexts.
+pub(super) const STORED: usize = first::END as usize;
+/// A power of two from the number of contexts on: what arrays have, so that masked indices need no check.
+pub(super) const CONTEXTS: usize = 1024;
+const _: () = assert!(STORED < CONTEXTS);
+
+/// The symbols that can occur in a context, a bit for each; none where a number is not the first of its context.
+pub(super) fn legal(context: usize) -> u64 {
+    let below = |symbols: usize| (1u64 << symbols) - 1;
+    // By edge, 14 less the edge; `each` contexts an edge.
+    let corners = |from: u32, each: usize| below(13 - (context - from as usize) / each);
+    match context as u32 {
+        // The last node of four is the last. There are no single children.
+        first::KIND..first::CONE_AND_FACE => (if context / 4 < 5 { 0xFFFF } else { 0xAAAA }) & !0b1100,
+        first::CONE_AND_FACE..first::CLASSES => {
+            if (context as u32 - first::CONE_AND_FACE).is_multiple_of(2) {
+                below(24)
+            } else {
+                0
+            }
+        }
+        // Six classes of columns, times six of rows.
+        first::CLASSES..first::EDGE => {
+            if (context as u32 - first::CLASSES).is_multiple_of(3) {
+                0x3F3F_3F3F_3F3F
+            } else {
+                0
+            }
+        }
+        first::EDGE..first::ALONG_1 => below(13),
+        first::ALONG_1..first::ALONG_2 => corners(first::ALONG_1, 6),
+        first::ALONG_2..first::ACROSS => corners(first::ALONG_2, 18),
+        first::ACROSS..first::GREEN => corners(first::ACROSS, 2),
+        _ => below(16),
+    }
+}
+
+/// Bytes that say which symbols have a frequency of their own.
+fn mask_bytes(legal: u64) -> usize {
+    (64 - legal.leading_zeros() as usize).div_ceil(8)
+}
 
 /// Occurrences of each symbol in each context.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Statistics {
-    counts: Vec<[u64; SYMBOLS]>,
+    /// By 16 · context + symbol.
+    counts: Vec<u64>,
 }
 
 impl Default for Statistics {
     fn default() -> Self {
-        Self { counts: vec![[0; SYMBOLS]; STORED] }
+        Self { counts: vec![0; CONTEXTS * ROW] }
     }
 }
 
 impl Statistics {
-    pub(super) fn count(&mut self, context: usize, symbol: u8) {
-        if let Some(counts) = self.counts.get_mut(context) {
-            counts[usize::from(symbol)] += 1;
+    #[inline(always)]
+    pub(super) fn count(&mut self, symbol: Symbol) {
+        if let Some(count) = self.counts.get_mut(usize::from(symbol.0)) {
+            *count += 1;
         }
     }
 
     /// Adds what others have counted; the order does not matter.
     pub fn add(&mut self, other: &Self) {
-        for (counts, more) in self.counts.iter_mut().flatten().zip(other.counts.as_flattened()) {
-            *counts += more;
+        for (count, more) in self.counts.iter_mut().zip(&other.counts) {
+            *count += more;
         }
     }
 }
@@ -83,13 +132,17 @@ impl PartialEq for Model {
 impl Eq for Model {}
 
 impl Model {
-    /// The model that codes what was counted in the fewest bits.
+    /// The model that codes what was counted in the fewest bits, and anything else in a few more: a sample of the pages will do.
     pub fn of(statistics: &Statistics) -> Self {
-        Self::with(statistics.counts.iter().map(Table::of_counts).collect())
+        let table = |context| {
+            let counts =
+                statistics.counts[context * ROW..].first_chunk().expect("there are more numbers than contexts");
+            Table::of_counts(counts, legal(context))
+        };
+        Self::with((0..STORED).map(table).collect())
     }
 
-    fn with(mut tables: Vec<Table>) -> Self {
-        tables.push(Table::uniform());
+    fn with(tables: Vec<Table>) -> Self {
         Self { slots: Slots::of(&tables), tables }
     }
 
@@ -101,14 +154,16 @@ impl Model {
         &self.tables
     }
 
-    /// For each context a `u16` with a bit for each symbol that occurs, then the frequencies of these but the last, as LEB128.
+    /// For each context as many bytes as its symbols need, with a bit for each symbol of a frequency above 1, then these frequencies but the last, as
+    /// LEB128. No bit: all legal symbols alike.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        for table in &self.tables[..STORED] {
+        for (context, table) in self.tables.iter().enumerate() {
             let frequencies = table.frequencies();
-            let present = |symbol: &usize| frequencies[*symbol] > 0;
-            let mask = (0..SYMBOLS).filter(present).fold(0u16, |mask, symbol| mask | 1 << symbol);
-            out.extend(mask.to_le_bytes());
+            let legal = legal(context);
+            let present = |symbol: &usize| frequencies[*symbol] > 1 && *table != Table::uniform(legal);
+            let mask = (0..SYMBOLS).filter(present).fold(0u64, |mask, symbol| mask | 1 << symbol);
+            out.extend(&mask.to_le_bytes()[..mask_bytes(legal)]);
             let mut left = mask.count_ones();
             for symbol in (0..SYMBOLS).filter(present) {
                 left -= 1;
@@ -127,21 +182,34 @@ impl Model {
     /// Undoes [`Model::to_bytes`].
     ///
     /// # Errors
-    /// [`FormatError::Invalid`] where the bytes end early or late, or frequencies do not sum to 1024.
+    /// [`FormatError::Invalid`] where the bytes end early or late, a symbol occurs that cannot, or frequencies do not sum to
+    /// 1024.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
         let mut rest = bytes.iter().copied();
         let mut byte = || {
             rest.next()
                 .ok_or_else(|| FormatError::invalid("the model", format!("{} bytes, expected more", bytes.len())))
         };
-        let mut tables = Vec::with_capacity(STORED + 1);
+        let mut tables = Vec::with_capacity(STORED);
         for context in 0..STORED {
-            let mask = u16::from_le_bytes([byte()?, byte()?]);
-            let mut frequencies = [0u16; SYMBOLS];
-            let mut left = u32::from(mask != 0) * super::rans::SCALE;
+            let legal = legal(context);
+            let mut mask = 0;
+            for at in 0..mask_bytes(legal) {
+                mask |= u64::from(byte()?) << (8 * at);
+            }
+            if mask & !legal != 0 {
+                let problem = format!("context {context} has symbols {mask:#06x}, expected none beyond {legal:#06x}");
+                return Err(FormatError::invalid("the model", problem));
+            }
+            if mask == 0 {
+                tables.push(Table::uniform(legal));
+                continue;
+            }
+            let mut frequencies: [u16; SYMBOLS] = std::array::from_fn(|symbol| (legal >> symbol & 1) as u16);
+            let mut left = SCALE - (legal & !mask).count_ones();
             for (symbol, frequency) in frequencies.iter_mut().enumerate().filter(|(symbol, _)| mask >> symbol & 1 != 0)
             {
-                let is_last = u32::from(mask) >> (symbol + 1) == 0;
+                let is_last = mask >> (symbol + 1) == 0;
                 let value = if is_last {
                     left
                 } else {
@@ -155,7 +223,7 @@ impl Model {
                 left -= value;
                 *frequency = value as u16;
             }
-            tables.push(Table::of_frequencies(&frequencies).expect("they were taken from the whole"));
+            tables.push(Table::of_frequencies(&frequencies));
         }
         match rest.count() {
             0 => Ok(Self::with(tables)),

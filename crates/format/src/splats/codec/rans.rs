@@ -1,62 +1,67 @@
-//! A static range coder over small alphabets: two interleaved rANS states, 10-bit probabilities, 16-bit words.
+//! A static range coder over small alphabets: rANS with 10-bit probabilities and 16-bit words.
 //!
-//! Symbols are 0–15, each coded under one of many [`Table`]s. The two states take turns, symbol by symbol, so that a decoder
-//! can work on both at once. The coder works backwards, so the decoder reads forwards.
+//! Each symbol is coded under one of many [`Table`]s. A page has several lanes, each with its own [`State`], so that a processor can
+//! work on all at once; they share [`Words`]. The coder works backwards, so the decoder reads forwards.
 //!
-//! What always holds: decoding any words whatever ends in a symbol or in `None`, never in a panic; a stream decodes to its
-//! end exactly when both states are back where coding began and no word is left.
+//! What always holds: decoding any words whatever gives symbols that the tables have, and never a panic; a page ends well
+//! exactly when all states are back where coding began and no word is left.
 //!
 //! Source: Duda, *Asymmetric numeral systems*, arXiv:1311.2540, 2013; interleaving as in Giesen, *Interleaved entropy coders*,
 //! arXiv:1402.3392, 2014.
 
-/// Bits of a probability: a table of slots for each context is then 4 KiB.
+use super::model::{CONTEXTS, STORED};
+
+/// Bits of a probability.
 pub(super) const SCALE_BITS: u32 = 10;
 /// The whole.
 pub(super) const SCALE: u32 = 1 << SCALE_BITS;
-/// Symbols of an alphabet.
-pub(super) const SYMBOLS: usize = 16;
-/// States stay at or above this between symbols; both begin here.
-const LOW: u32 = 1 << 16;
+/// Most symbols of an alphabet.
+pub(super) const SYMBOLS: usize = 48;
+/// Places of a context in a table of symbols; one that has more symbols takes several numbers.
+pub(super) const ROW: usize = 16;
+/// States stay at or above this between symbols; all begin here.
+pub(super) const LOW: u32 = 1 << 16;
 
 /// Probabilities of the symbols in one context, as running sums: symbol i has the slots from `ends[i − 1]` up to `ends[i]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Table {
-    /// Not falling; the last is [`SCALE`], except in a context that never occurs, where all are 0.
+    /// Not falling; the last is [`SCALE`], or all are 0 where there are no symbols.
     ends: [u16; SYMBOLS],
 }
 
 impl Table {
-    /// Of a context that never occurs.
-    pub(super) const UNUSED: Self = Self { ends: [0; SYMBOLS] };
-
-    /// All symbols alike.
-    pub(super) fn uniform() -> Self {
-        Self { ends: std::array::from_fn(|symbol| ((symbol + 1) * SCALE as usize / SYMBOLS) as u16) }
+    /// All of some symbols alike, the first taking what is left over.
+    pub(super) fn uniform(legal: u64) -> Self {
+        if legal == 0 {
+            return Self { ends: [0; SYMBOLS] };
+        }
+        let share = (SCALE / legal.count_ones()) as u16;
+        let mut frequencies = std::array::from_fn(|symbol| if legal >> symbol & 1 != 0 { share } else { 0 });
+        frequencies[legal.trailing_zeros() as usize] += (SCALE % legal.count_ones()) as u16;
+        Self::of_frequencies(&frequencies)
     }
 
-    /// From frequencies that sum to [`SCALE`] (or all 0).
-    pub(super) fn of_frequencies(frequencies: &[u16; SYMBOLS]) -> Option<Self> {
-        let mut sum = 0u32;
-        let mut ends = [0; SYMBOLS];
-        for (end, frequency) in ends.iter_mut().zip(frequencies) {
-            sum += u32::from(*frequency);
-            if sum > SCALE {
-                return None;
-            }
-            *end = sum as u16;
-        }
-        (sum == SCALE || sum == 0).then_some(Self { ends })
-    }
-
-    /// Frequencies in proportion to `counts`, at least 1 for each symbol that occurs.
-    pub(super) fn of_counts(counts: &[u64; SYMBOLS]) -> Self {
-        let total: u64 = counts.iter().sum();
-        if total == 0 {
-            return Self::UNUSED;
-        }
-        let mut frequencies = counts.map(|count| {
-            if count == 0 { 0 } else { ((count as u128 * u128::from(SCALE) / u128::from(total)) as u16).max(1) }
+    /// From frequencies that sum to [`SCALE`].
+    pub(super) fn of_frequencies(frequencies: &[u16; SYMBOLS]) -> Self {
+        let mut sum = 0;
+        let ends = frequencies.map(|frequency| {
+            sum += frequency;
+            sum
         });
+        debug_assert_eq!(u32::from(sum), SCALE);
+        Self { ends }
+    }
+
+    /// Frequencies in proportion to `counts`, at least 1 for each legal symbol.
+    pub(super) fn of_counts(counts: &[u64; SYMBOLS], legal: u64) -> Self {
+        let weights: [u128; SYMBOLS] =
+            std::array::from_fn(|symbol| if legal >> symbol & 1 != 0 { 8 * u128::from(counts[symbol]) + 1 } else { 0 });
+        let total: u128 = weights.iter().sum();
+        if total == u128::from(legal.count_ones()) {
+            return Self::uniform(legal);
+        }
+        let share = |weight| (((weight * u128::from(SCALE) + total / 2) / total) as u16).max(u16::from(weight > 0));
+        let mut frequencies = weights.map(share);
         // What rounding left over or took too much goes to or comes from the largest, which feel it least.
         loop {
             let sum: i32 = frequencies.iter().map(|f| i32::from(*f)).sum();
@@ -69,158 +74,217 @@ impl Table {
             let step = missing.max(-(i32::from(*largest) - 1).min(16));
             *largest = (i32::from(*largest) + step) as u16;
         }
-        Self::of_frequencies(&frequencies).expect("made to sum to the whole")
+        Self::of_frequencies(&frequencies)
     }
 
     /// Frequencies of all symbols.
     pub(super) fn frequencies(&self) -> [u16; SYMBOLS] {
-        std::array::from_fn(|symbol| (self.end(symbol) - self.start(symbol)) as u16)
+        std::array::from_fn(|symbol| self.ends[symbol] - self.start(symbol))
     }
 
-    fn start(&self, symbol: usize) -> u32 {
-        if symbol == 0 { 0 } else { self.end(symbol - 1) }
-    }
-
-    fn end(&self, symbol: usize) -> u32 {
-        u32::from(self.ends[symbol])
+    fn start(&self, symbol: usize) -> u16 {
+        if symbol == 0 { 0 } else { self.ends[symbol - 1] }
     }
 }
 
-/// What a decoder looks up: for each context and slot the symbol, and the numbers that take the state back.
+/// What a decoder looks up.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
-    /// `symbol << 22 | frequency << 10 | (slot − start)`; 0, a frequency of 0, in contexts that never occur.
-    entries: Vec<u32>,
+    /// By 1024 · context + slot: a byte each, so that what is in use fits a processor's cache.
+    symbols: Box<[u8; CONTEXTS * SCALE as usize]>,
+    /// By 16 · context + symbol: `frequency << 16 | start`.
+    shares: Box<[u32; CONTEXTS * ROW]>,
 }
 
 impl Slots {
     pub(super) fn of(tables: &[Table]) -> Self {
-        let mut entries = vec![0; tables.len() << SCALE_BITS];
-        for (entries, table) in entries.chunks_exact_mut(SCALE as usize).zip(tables) {
+        let mut symbols = vec![0; CONTEXTS * SCALE as usize];
+        let mut shares = vec![0; CONTEXTS * ROW];
+        for (context, table) in tables.iter().enumerate() {
             for symbol in 0..SYMBOLS {
-                let (start, end) = (table.start(symbol), table.end(symbol));
-                for slot in start..end {
-                    entries[slot as usize] =
-                        (symbol as u32) << (2 * SCALE_BITS + 2) | (end - start) << SCALE_BITS | (slot - start);
+                let (start, end) = (table.start(symbol), table.ends[symbol]);
+                let slots = context * SCALE as usize + usize::from(start)..context * SCALE as usize + usize::from(end);
+                symbols[slots].fill(symbol as u8);
+                if end > start {
+                    shares[context * ROW + symbol] = u32::from(end - start) << 16 | u32::from(start);
                 }
             }
         }
-        Self { entries }
-    }
-}
-
-/// Codes symbols with their tables, in order; returns the bytes.
-pub(super) fn encode(symbols: &[(u16, u8)], tables: &[Table], out: &mut Vec<u8>) {
-    let mut states = [LOW; 2];
-    let mut words: Vec<u16> = Vec::with_capacity(symbols.len() / 4);
-    for (at, (context, symbol)) in symbols.iter().enumerate().rev() {
-        let table = &tables[usize::from(*context)];
-        let start = table.start(usize::from(*symbol));
-        let frequency = table.end(usize::from(*symbol)) - start;
-        debug_assert!(frequency > 0, "symbol {symbol} never occurs in context {context}");
-        let state = &mut states[at & 1];
-        if u64::from(*state) >= u64::from(frequency) << (32 - SCALE_BITS) {
-            words.push(*state as u16);
-            *state >>= 16;
+        let all = "there are as many as contexts";
+        Self {
+            symbols: symbols.into_boxed_slice().try_into().expect(all),
+            shares: shares.into_boxed_slice().try_into().expect(all),
         }
-        *state = ((*state / frequency) << SCALE_BITS) + *state % frequency + start;
     }
-    out.extend(states.iter().flat_map(|state| state.to_le_bytes()));
-    out.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
 }
 
-/// Reads what [`encode`] wrote.
-pub(super) struct Decoder<'a> {
-    /// Whose turn it is comes first.
-    states: [u32; 2],
-    words: &'a [[u8; 2]],
-    slots: &'a Slots,
+/// Most words of a page, less one: enough for any that is shorter than a raw page.
+pub(super) const MOST_WORDS: usize = 1 << 15;
+
+/// The words of a page, and zeros: whichever lane needs one takes the next.
+pub(super) struct Words {
+    words: Box<[u16; MOST_WORDS]>,
+    length: usize,
 }
 
-impl<'a> Decoder<'a> {
-    /// `None` where the bytes are too few or odd.
-    pub(super) fn new(bytes: &'a [u8], slots: &'a Slots) -> Option<Self> {
-        let (a, rest) = bytes.split_first_chunk()?;
-        let (b, rest) = rest.split_first_chunk()?;
-        let (words, []) = rest.as_chunks() else { return None };
-        Some(Self { states: [u32::from_le_bytes(*a), u32::from_le_bytes(*b)], words, slots })
-    }
-
-    /// The next symbol; `None` where there cannot be one.
-    #[inline(always)]
-    pub(super) fn symbol(&mut self, context: usize) -> Option<u8> {
-        let state = self.states[0];
-        let entry = self.slots.entries[context << SCALE_BITS | (state & (SCALE - 1)) as usize];
-        let frequency = entry >> SCALE_BITS & (2 * SCALE - 1);
-        if frequency == 0 {
+impl Words {
+    /// `None` where there are too many, or half of one.
+    pub(super) fn new(bytes: &[u8]) -> Option<Self> {
+        let (bytes, []) = bytes.as_chunks() else { return None };
+        let mut words: Box<[u16; MOST_WORDS]> = vec![0; MOST_WORDS].into_boxed_slice().try_into().ok()?;
+        if bytes.len() >= MOST_WORDS {
             return None;
         }
-        let mut next = frequency * (state >> SCALE_BITS) + (entry & (SCALE - 1));
-        if next < LOW {
-            let (word, rest) = self.words.split_first()?;
-            self.words = rest;
-            next = next << 16 | u32::from(u16::from_le_bytes(*word));
+        for (word, bytes) in words.iter_mut().zip(bytes) {
+            *word = u16::from_le_bytes(*bytes);
         }
-        self.states = [self.states[1], next];
-        Some((entry >> (2 * SCALE_BITS + 2)) as u8)
+        Some(Self { words, length: bytes.len() })
     }
 
-    /// True when everything was read and nothing is left.
-    pub(super) fn is_at_end(&self) -> bool {
-        self.words.is_empty() && self.states == [LOW; 2]
+    pub(super) fn reader(&self) -> Reader<'_> {
+        Reader { words: &self.words, at: 0, length: self.length }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
+/// How far [`Words`] were read.
+#[derive(Clone, Copy)]
+pub(super) struct Reader<'a> {
+    words: &'a [u16; MOST_WORDS],
+    at: usize,
+    length: usize,
+}
 
-    proptest! {
-        #[test]
-        fn symbols_come_back_in_order_and_nothing_is_left(
-            symbols in prop::collection::vec((0u16..3, 0u8..16), 0..400), skew in 0u64..40,
-        ) {
-            let mut counts = [[0u64; SYMBOLS]; 3];
-            for (context, symbol) in &symbols {
-                counts[usize::from(*context)][usize::from(*symbol)] += 1 + skew * u64::from(16 - symbol);
-            }
-            let tables = counts.map(|counts| Table::of_counts(&counts));
-            let mut bytes = Vec::new();
-            encode(&symbols, &tables, &mut bytes);
-            let slots = Slots::of(&tables);
-            let mut decoder = Decoder::new(&bytes, &slots).unwrap();
-            for (context, symbol) in &symbols {
-                prop_assert_eq!(decoder.symbol(usize::from(*context)), Some(*symbol));
-            }
-            prop_assert!(decoder.is_at_end());
-        }
-
-        #[test]
-        fn any_bytes_decode_to_symbols_or_to_an_end(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-            let tables = [Table::uniform(), Table::UNUSED];
-            let slots = Slots::of(&tables);
-            if let Some(mut decoder) = Decoder::new(&bytes, &slots) {
-                prop_assert!((0..300).all(|_| decoder.symbol(0).is_none_or(|symbol| symbol < 16)));
-                prop_assert_eq!(decoder.symbol(1), None);
-            }
-        }
-
-        #[test]
-        fn frequencies_sum_to_the_whole_and_forget_no_symbol(counts in prop::array::uniform16(0u64..1 << 40)) {
-            let frequencies = Table::of_counts(&counts).frequencies();
-            let sum: u32 = frequencies.iter().map(|f| u32::from(*f)).sum();
-            prop_assert!(sum == SCALE || counts.iter().all(|count| *count == 0));
-            prop_assert!(std::iter::zip(frequencies, counts).all(|(f, count)| (f > 0) == (count > 0)));
-        }
+impl Reader<'_> {
+    /// True when all were taken, and no more were asked for.
+    pub(super) fn is_at_end(&self) -> bool {
+        self.at == self.length
     }
 
-    #[test]
-    fn a_symbol_that_is_certain_costs_nothing() {
-        let mut counts = [0; SYMBOLS];
-        counts[7] = 1000;
-        let mut bytes = Vec::new();
-        encode(&[(0, 7); 1000], &[Table::of_counts(&counts)], &mut bytes);
-        assert_eq!(bytes.len(), 8, "two states and no word");
+    /// The state that comes of `next`, with a word if it needs one.
+    #[inline(always)]
+    fn filled(&mut self, next: u32) -> u32 {
+        let word = u32::from(self.words[self.at & (MOST_WORDS - 1)]);
+        let short = next < LOW;
+        self.at += usize::from(short);
+        if short { next << 16 | word } else { next }
+    }
+}
+
+/// One lane of what [`Coder`] wrote.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct State(pub(super) u32);
+
+impl State {
+    /// Where coding begins, and decoding ends.
+    pub(super) const END: Self = Self(LOW);
+
+    /// The next symbol.
+    #[inline(always)]
+    pub(super) fn symbol(&mut self, slots: &Slots, words: &mut Reader<'_>, context: u32) -> u32 {
+        let slot = self.0 & (SCALE - 1);
+        let symbol = slots.symbols[(context << SCALE_BITS | slot) as usize & (CONTEXTS * SCALE as usize - 1)];
+        let share = slots.shares[(context as usize * ROW + usize::from(symbol)) & (CONTEXTS * ROW - 1)];
+        self.0 = words.filled((share >> 16) * (self.0 >> SCALE_BITS) + slot - (share & 0xFFFF));
+        u32::from(symbol)
+    }
+
+    /// A number of at most 10 bits, all alike.
+    #[inline(always)]
+    pub(super) fn bits(&mut self, words: &mut Reader<'_>, bits: u32) -> u32 {
+        let value = self.0 & ((1 << bits) - 1);
+        self.0 = words.filled(self.0 >> bits);
+        value
+    }
+}
+
+/// What a coder looks up for a symbol in a context: the state x becomes x + steps · ⌊x · reciprocal / 2^64⌋ + bias.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    /// 2^64 / frequency, rounded up: with it ⌊x / frequency⌋ is exact for every state. For a frequency of 1 one less than that, so
+    /// x − 1 takes its place, and `bias` makes up for it.
+    reciprocal: u64,
+    /// From here on, in 2^22, the state must lose a word before.
+    full: u16,
+    steps: u16,
+    bias: u32,
+}
+
+impl Entry {
+    /// Of what has `frequency` of `scale` slots, from `start` on.
+    fn new(frequency: u32, start: u32, scale: u32) -> Self {
+        let (reciprocal, bias) = match frequency {
+            1 => (u64::MAX, start + scale - 1),
+            _ => (u64::MAX / u64::from(frequency) + 1, start),
+        };
+        let full = ((u64::from(frequency) << 32) / u64::from(scale)) >> (32 - SCALE_BITS);
+        Self { reciprocal, full: full as u16, steps: (scale - frequency) as u16, bias }
+    }
+}
+
+/// Most bits of a number that is coded as it is.
+const MOST_BITS: u32 = 10;
+/// Entries of such numbers, by [`entry_of_bits`].
+const FIRST_OF_BITS: usize = (CONTEXTS - 1) * ROW - (2 << MOST_BITS);
+const _: () = assert!(STORED * ROW <= FIRST_OF_BITS);
+
+/// What a coder takes in place of 16 · context + symbol for a number of some bits.
+#[inline(always)]
+pub(super) fn entry_of_bits(bits: u32, value: u32) -> u16 {
+    (FIRST_OF_BITS as u32 + (1 << bits) + value) as u16
+}
+
+/// Entries by 16 · context + symbol.
+#[derive(Clone, Debug)]
+pub(super) struct Entries(Box<[Entry; CONTEXTS * ROW]>);
+
+impl Entries {
+    pub(super) fn of(tables: &[Table]) -> Self {
+        let mut entries = vec![Entry::default(); CONTEXTS * ROW];
+        for (context, table) in tables.iter().enumerate() {
+            for (symbol, frequency) in table.frequencies().into_iter().enumerate().filter(|(_, f)| *f > 0) {
+                entries[context * ROW + symbol] =
+                    Entry::new(u32::from(frequency), u32::from(table.start(symbol)), SCALE);
+            }
+        }
+        for bits in 0..=MOST_BITS {
+            for value in 0..1 << bits {
+                entries[usize::from(entry_of_bits(bits, value))] = Entry::new(1, value, 1 << bits);
+            }
+        }
+        Self(entries.into_boxed_slice().try_into().expect("there are as many as contexts have symbols"))
+    }
+}
+
+/// Codes symbols backwards: the last that is to be read comes first.
+pub(super) struct Coder<'a> {
+    entries: &'a Entries,
+    /// The last first.
+    words: &'a mut [u16],
+    at: usize,
+}
+
+impl<'a> Coder<'a> {
+    /// There must be room for as many words as symbols will come.
+    pub(super) fn new(entries: &'a Entries, words: &'a mut [u16]) -> Self {
+        Self { entries, words, at: 0 }
+    }
+
+    /// One symbol, as 16 · context + symbol.
+    #[inline(always)]
+    pub(super) fn put(&mut self, state: &mut State, symbol: u16) {
+        let entry = &self.entries.0[usize::from(symbol) & (CONTEXTS * ROW - 1)];
+        let full = state.0 >> (32 - SCALE_BITS) >= u32::from(entry.full);
+        if let Some(word) = self.words.get_mut(self.at) {
+            *word = state.0 as u16;
+        }
+        self.at += usize::from(full);
+        let fits = if full { state.0 >> 16 } else { state.0 };
+        let quotient = ((u128::from(fits) * u128::from(entry.reciprocal)) >> 64) as u32;
+        state.0 = fits + quotient * u32::from(entry.steps) + entry.bias;
+    }
+
+    /// The words so far, the last first.
+    pub(super) fn words(self) -> &'a [u16] {
+        &self.words[..self.at]
     }
 }
