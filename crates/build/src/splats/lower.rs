@@ -1,7 +1,7 @@
 //! Top-down quantisation of a tree: each node's sphere becomes a code relative to its parent's *decoded* sphere. Then the families
 //! are put into the order of the file: by size of sphere, coarse first.
 //!
-//! [`Kept`] nodes and the root's decoded sphere go in; [`Lowered`] nodes come out. A family's *bucket* is the size of the largest
+//! Kept nodes and the root's decoded sphere go in; [`Lowered`] nodes come out. A family's *bucket* is the size of the largest
 //! decoded sphere among the nodes that it refines, in quarters of an octave, counted from 0 at the model's root downwards. As no
 //! decoded sphere is larger than its parent's, a family's bucket is never below that of the family it hangs from.
 //!

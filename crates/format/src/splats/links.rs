@@ -4,7 +4,7 @@
 //! cursor, skips some families, and leads to the next; the cursor then stands behind it. Families that hang from one page lie
 //! in a few places, in each nearly one after the other, so links are small.
 //!
-//! In: the numbers of families as a writer orders them ([`Linker`]); or links, as a reader finds them ([`Cursors`]).
+//! In: the numbers of families as a writer orders them ([`Linker`]); or links, as a reader finds them (`Cursors`).
 //! What always holds: links resolve to what the linker was given; hostile links resolve to a family of a later page, to one
 //! later in the same page, or to nothing, after at most 16 · 65,536 steps a page.
 

@@ -208,7 +208,7 @@ impl Context {
         self.corners |= u64::from(corner) << self.of_face.across;
     }
 
-    /// The node's bits, and its sphere: [`NONE`] where there is no such. Then the next one begins.
+    /// The node's bits, and its sphere: `NONE` where there is no such. Then the next one begins.
     #[inline(always)]
     pub(super) fn finish(&mut self) -> (u32, u16) {
         let places = self.places();

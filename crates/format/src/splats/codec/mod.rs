@@ -3,7 +3,7 @@
 //! A field is coded after what it depends on: the tree bits and the cone first, then the normal relative to its siblings',
 //! then the sphere, whose place across the surface follows from the normal and its places along it. The nodes of a page are
 //! dealt to four lanes that know nothing of each other, so a processor can decode four nodes at once. Coder and decoder
-//! share [`context`], so they cannot disagree about what depends on what.
+//! share `context`, so they cannot disagree about what depends on what.
 //!
 //! What always holds: any page decodes to itself under any model; any bytes decode to a page or to an error.
 
