@@ -36,10 +36,12 @@ pub(crate) struct Journal {
 pub(crate) struct Extent {
     pub(crate) records: u64,
     pub(crate) record_bytes: u64,
+    /// CRC-32C of these bytes.
+    pub(crate) checksum: u32,
 }
 
 /// First word of each journal; the number changes with the meaning of journals or spools.
-const MAGIC: &str = "gigalod-build-journal-1";
+const MAGIC: &str = "gigalod-build-journal-2";
 
 impl Journal {
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
@@ -86,7 +88,7 @@ mod tests {
     fn journal() -> Journal {
         let input = InputIdentity { path: "/a".into(), bytes: 7, modified: (1, 2), ends: [3, 4] };
         let header = Header { program: "gigalod".into(), input, options: BTreeMap::from([("up".into(), "y".into())]) };
-        let spools = BTreeMap::from([("leaves".into(), Extent { records: 5, record_bytes: 20 })]);
+        let spools = BTreeMap::from([("leaves".into(), Extent { records: 5, record_bytes: 20, checksum: 7 })]);
         let state = serde_json::json!({ "origin": [0.1, 1e-300, f64::MAX] });
         Journal { header, phase: "leaves".into(), spools, state }
     }

@@ -62,6 +62,10 @@ impl Output {
     /// # Errors
     /// What the system says.
     pub fn publish(self) -> io::Result<()> {
+        // Who may read what was there may read what takes its place, and nobody else.
+        if let Ok(before) = std::fs::metadata(&self.path) {
+            self.file.set_permissions(before.permissions())?;
+        }
         self.file.sync_all()?;
         let names = registry();
         std::fs::rename(&self.temporary, &self.path)?;

@@ -26,7 +26,12 @@ pub(crate) enum Place<'a> {
 #[derive(Debug)]
 pub(crate) enum Spool<T> {
     Memory(Vec<T>),
-    File { file: File, len: u64, name: Option<String> },
+    File {
+        file: File,
+        len: u64,
+        /// For what a later step needs: its name, and the CRC-32C of all that was pushed.
+        kept: Option<(String, u32)>,
+    },
 }
 
 impl<T: Pod> Spool<T> {
@@ -38,29 +43,30 @@ impl<T: Pod> Spool<T> {
             Place::Work(work) => work.folder(),
         };
         let _names = registry();
-        Ok(Self::File { file: tempfile::tempfile_in(folder)?, len: 0, name: None })
+        Ok(Self::File { file: tempfile::tempfile_in(folder)?, len: 0, kept: None })
     }
 
     /// For what a later step needs. No two steps in a row use the same name for different things.
     pub(crate) fn named(place: &Place<'_>, name: &str) -> io::Result<Self> {
         match place {
-            Place::Work(work) => Ok(Self::File { file: work.create(name)?, len: 0, name: Some(name.to_string()) }),
+            Place::Work(work) => Ok(Self::File { file: work.create(name)?, len: 0, kept: Some((name.to_string(), 0)) }),
             other => Self::new(other),
         }
     }
 
     /// As an earlier process left it.
     pub(crate) fn reopen(work: &Work, name: &str) -> io::Result<Self> {
-        let (file, len) = work.reopen(name, size_of::<T>() as u64)?;
-        Ok(Self::File { file, len, name: Some(name.to_string()) })
+        let (file, extent) = work.reopen(name, size_of::<T>() as u64)?;
+        Ok(Self::File { file, len: extent.records, kept: Some((name.to_string(), extent.checksum)) })
     }
 
     /// Puts all of it on disk, for [`Work::finish`].
     pub(crate) fn secure(&self) -> io::Result<(String, Extent)> {
         match self {
-            Self::File { file, len, name: Some(name) } => {
+            Self::File { file, len, kept: Some((name, checksum)) } => {
                 file.sync_all()?;
-                Ok((name.clone(), Extent { records: *len, record_bytes: size_of::<T>() as u64 }))
+                let record_bytes = size_of::<T>() as u64;
+                Ok((name.clone(), Extent { records: *len, record_bytes, checksum: *checksum }))
             }
             _ => Err(io::Error::other("a spool without a name cannot be kept")),
         }
@@ -83,9 +89,13 @@ impl<T: Pod> Spool<T> {
     pub(crate) fn push(&mut self, records: &[T]) -> io::Result<()> {
         match self {
             Self::Memory(all) => all.extend_from_slice(records),
-            Self::File { file, len, .. } => {
-                write_at(file, *len * size_of::<T>() as u64, bytemuck::cast_slice(records))?;
+            Self::File { file, len, kept } => {
+                let bytes = bytemuck::cast_slice(records);
+                write_at(file, *len * size_of::<T>() as u64, bytes)?;
                 *len += records.len() as u64;
+                if let Some((_, checksum)) = kept {
+                    *checksum = crc32c::crc32c_append(*checksum, bytes);
+                }
             }
         }
         Ok(())
@@ -107,11 +117,14 @@ impl<T: Pod> Spool<T> {
         self.read(start, out)
     }
 
-    /// Overwrites records from `start` on.
+    /// Overwrites records from `start` on, of a spool that no later step needs.
     pub(crate) fn write(&mut self, start: u64, records: &[T]) -> io::Result<()> {
         match self {
             Self::Memory(all) => all[start as usize..][..records.len()].copy_from_slice(records),
-            Self::File { file, .. } => write_at(file, start * size_of::<T>() as u64, bytemuck::cast_slice(records))?,
+            Self::File { file, kept, .. } => {
+                debug_assert!(kept.is_none(), "what is kept is only added to, or its checksum were wrong");
+                write_at(file, start * size_of::<T>() as u64, bytemuck::cast_slice(records))?;
+            }
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ use crate::output::{folder_of, sync_folder};
 use crate::unfinished::{self, Active, SPOOL_SUFFIX, registry};
 use serde_json::Value;
 use std::fs::{File, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// A work folder that this process has locked.
@@ -62,7 +62,7 @@ impl Work {
         let existed = folder.exists();
         let mut registry = registry();
         let lock = lock(&folder)?;
-        let found = if resume { Found::read(&folder) } else { Found::Nothing("not asked for") };
+        let found = if resume { Found::read(&folder).checked(&folder) } else { Found::Nothing("not asked for") };
         let found = match found {
             Found::Journal(journal) => match journal.header.difference(&header) {
                 Some((what, expected, found)) => {
@@ -109,11 +109,11 @@ impl Work {
     }
 
     /// Opens the file of a spool that the journal names.
-    pub(crate) fn reopen(&self, name: &str, record_bytes: u64) -> io::Result<(File, u64)> {
+    pub(crate) fn reopen(&self, name: &str, record_bytes: u64) -> io::Result<(File, Extent)> {
         let extent = self.found.as_ref().and_then(|journal| journal.spools.get(name));
         match extent {
             Some(extent) if extent.record_bytes == record_bytes => {
-                Ok((File::options().read(true).write(true).open(self.path_of(name))?, extent.records))
+                Ok((File::options().read(true).write(true).open(self.path_of(name))?, *extent))
             }
             _ => Err(io::Error::new(io::ErrorKind::InvalidData, format!("the journal names no such spool: {name}"))),
         }
@@ -194,6 +194,39 @@ impl Found {
         };
         if journal.spools.iter().all(is_there) { Self::Journal(journal) } else { Self::Nothing("files are missing") }
     }
+}
+
+impl Found {
+    /// The same, if the bytes that the journal names are still those that were written.
+    fn checked(self, folder: &Path) -> Self {
+        match self {
+            Self::Journal(journal) => {
+                let is_whole = |(name, extent): (&String, &Extent)| {
+                    checksum_of(&folder.join(format!("{name}{SPOOL_SUFFIX}")), extent.records * extent.record_bytes)
+                        .is_ok_and(|found| found == extent.checksum)
+                };
+                if journal.spools.iter().all(is_whole) {
+                    Self::Journal(journal)
+                } else {
+                    Self::Nothing("its files are damaged")
+                }
+            }
+            nothing => nothing,
+        }
+    }
+}
+
+/// CRC-32C of the first bytes of a file.
+fn checksum_of(path: &Path, bytes: u64) -> io::Result<u32> {
+    let (mut file, mut left, mut checksum) = (File::open(path)?, bytes, 0);
+    let mut piece = vec![0; 1 << 20];
+    while left > 0 {
+        let now = left.min(piece.len() as u64) as usize;
+        file.read_exact(&mut piece[..now])?;
+        checksum = crc32c::crc32c_append(checksum, &piece[..now]);
+        left -= now as u64;
+    }
+    Ok(checksum)
 }
 
 /// Creates and locks the folder.

@@ -322,3 +322,19 @@ fn an_input_that_changes_while_it_is_read_is_refused_for_that() {
         assert_eq!(names_in(folder.path()), ["a.ply"], "{what}");
     }
 }
+
+#[test]
+#[cfg(unix)]
+fn a_replaced_file_keeps_its_permissions_and_a_folders_name_is_refused_at_once() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("private.glod");
+    std::fs::write(&out, "old").unwrap();
+    std::fs::set_permissions(&out, std::fs::Permissions::from_mode(0o600)).unwrap();
+    run!["build", statue().ply, "-o", out].done();
+    assert_eq!(out.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+    let ran = run!["build", statue().ply, "-o", format!("{}/", folder.path().join("new.glod").display())];
+    assert_eq!(ran.status, 1);
+    assert!(ran.stderr.contains("the name of a folder, expected that of a file"), "{ran:?}");
+    assert_eq!(names_in(folder.path()), ["private.glod"]);
+}

@@ -173,6 +173,17 @@ fn a_damaged_journal_begins_anew_and_says_so() {
     let ran = place.resume(&ply).done();
     assert!(ran.stderr.contains(": files are missing, starting from the beginning\n"), "{ran:?}");
     assert!(std::fs::read(&place.out).unwrap() == bytes);
+
+    // One bit of the data themselves.
+    let (place, ply, bytes) = interrupted();
+    let spool = place.work.join("leaves.spool");
+    let mut leaves = std::fs::read(&spool).unwrap();
+    let middle = leaves.len() / 2;
+    leaves[middle] ^= 1;
+    std::fs::write(&spool, leaves).unwrap();
+    let ran = place.resume(&ply).done();
+    assert!(ran.stderr.contains(": its files are damaged, starting from the beginning\n"), "{ran:?}");
+    assert!(std::fs::read(&place.out).unwrap() == bytes);
 }
 
 #[test]

@@ -67,6 +67,9 @@ fn expect_regular(path: &Path) -> Result<(), CliError> {
 /// Refuses an output that would take the place of one of `inputs`, or of a device or pipe. Folders are refused when it comes
 /// to writing.
 pub(crate) fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), CliError> {
+    if output.as_os_str().as_encoded_bytes().ends_with(b"/") {
+        return Err(CliError::in_file(output, "the name of a folder, expected that of a file"));
+    }
     let Ok(metadata) = std::fs::metadata(output) else { return Ok(()) };
     if !metadata.is_file() && !metadata.is_dir() {
         return Err(CliError::in_file(output, "not a regular file: it would be replaced"));
