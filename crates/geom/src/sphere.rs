@@ -44,31 +44,6 @@ impl Sphere {
         };
         reach <= f64::from(self.radius) * (1.0 - 1e-9)
     }
-
-    /// The smallest ball around both, rounded outwards: it [`encloses`](Self::encloses) both.
-    pub fn around(a: &Sphere, b: &Sphere) -> Sphere {
-        let (ca, cb) = (a.center.as_dvec3(), b.center.as_dvec3());
-        let (ra, rb) = (f64::from(a.radius), f64::from(b.radius));
-        let apart = (cb - ca).length();
-        if apart + rb <= ra {
-            return *a;
-        }
-        if apart + ra <= rb {
-            return *b;
-        }
-        let radius = (apart + ra + rb) * 0.5;
-        let center = (ca + (cb - ca) * ((radius - ra) / apart)).as_vec3();
-        Self::outward(center, [(ca, ra), (cb, rb)])
-    }
-
-    /// The ball at `center` that encloses the given balls, its radius rounded up to `f32` far enough for
-    /// [`encloses`](Self::encloses) to agree.
-    pub fn outward<const N: usize>(center: Vec3, balls: [(DVec3, f64); N]) -> Sphere {
-        let at = center.as_dvec3();
-        let reach = balls.iter().fold(0.0_f64, |reach, (c, r)| reach.max((*c - at).length() + r));
-        // Two roundings of f64 (the length, the later squares) stay far below one step of f32.
-        Sphere { center, radius: round_up(reach * (1.0 + 1e-14)) }
-    }
 }
 
 /// The smallest `f32` that is not below `value`.
@@ -103,15 +78,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn around_encloses_both_and_is_no_larger_than_it_must(a in spheres(), b in spheres()) {
-            let ball = Sphere::around(&a, &b);
-            prop_assert!(ball.encloses(&a) && ball.encloses(&b));
-            let apart = (a.center.as_dvec3() - b.center.as_dvec3()).length();
-            let least = ((apart + f64::from(a.radius) + f64::from(b.radius)) * 0.5).max(f64::from(a.radius.max(b.radius)));
-            prop_assert!(f64::from(ball.radius) <= least + 1e-3);
-        }
-
         #[test]
         fn what_two_balls_have_in_common_is_enclosed(
             a in spheres(), towards in prop::array::uniform3(-1f32..1.0), apart in 0f32..1.2, ratio in 0.3f32..1.5,

@@ -46,17 +46,21 @@ pub(super) struct Head {
 
 impl Head {
     fn of(root: &Measured, nodes: &[Kept], colors: &[u16]) -> Self {
-        let group_size = nodes[0].children().count;
-        let at = |place: usize| 1 + place.min(nodes.len() - 1).min(usize::from(group_size).max(1) - 1);
-        Self {
+        let group_size = usize::from(nodes[0].children().count);
+        let mut head = Self {
             root: nodes[0],
-            group: std::array::from_fn(|place| nodes.get(at(place)).copied().unwrap_or_default()),
-            colors: std::array::from_fn(|place| colors.get(at(place)).copied().unwrap_or_default()),
+            group: Default::default(),
+            colors: Default::default(),
             cos_spread: root.cos_spread,
             sums: root.sums,
             normal: root.normal,
-            group_size: u16::from(group_size),
+            group_size: group_size as u16,
+        };
+        head.group[..group_size].copy_from_slice(&nodes[1..=group_size]);
+        if !colors.is_empty() {
+            head.colors[..group_size].copy_from_slice(&colors[1..=group_size]);
         }
+        head
     }
 
     pub(super) fn sphere(&self) -> Sphere {
