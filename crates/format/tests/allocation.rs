@@ -1,35 +1,14 @@
 //! Files that claim to be enormous: opening one allocates no more than the format's limits. Alone in its program, because
 //! the allocator counts for all threads.
 
+#[path = "../../gigalod/tests/counting/mod.rs"]
+mod counting;
+
+use counting::peak_of;
 use gigalod_format::splats::{PageId, SplatFile};
 use gigalod_format::{Container, PageStore, checksum};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-
-struct Counting;
-
-static LIVE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: passes everything on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        PEAK.fetch_max(LIVE.fetch_add(layout.size(), Relaxed) + layout.size(), Relaxed);
-        // SAFETY: the caller's promises are those that the system's allocator asks for.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size(), Relaxed);
-        // SAFETY: as above; `pointer` came from `System.alloc` with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// A sparse file: some bytes, then zeros as far as one likes.
 struct Sparse {
@@ -69,14 +48,6 @@ fn sparse(bytes: u64, skeleton: (u64, &[u8]), metadata_bytes: u64) -> Arc<Sparse
     head.extend(checksum(&head).to_le_bytes());
     head.extend(skeleton.1);
     Arc::new(Sparse { head, bytes })
-}
-
-/// What `act` allocates at most, beyond what was there.
-fn peak_of<T>(act: impl FnOnce() -> T) -> (T, usize) {
-    let before = LIVE.load(Relaxed);
-    PEAK.store(before, Relaxed);
-    let result = act();
-    (result, PEAK.load(Relaxed) - before)
 }
 
 #[test]
