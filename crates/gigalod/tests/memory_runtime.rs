@@ -9,7 +9,7 @@ use gigalod::format::splats::SplatFile;
 use gigalod::format::{Container, FileStore};
 use gigalod::geom::{Camera, ImageSize};
 use gigalod::runtime::residency::{InlineLoader, Loader, ThreadedLoader};
-use gigalod::runtime::{Instance, Residency, Scene, Similarity, SplatDraw, ViewId};
+use gigalod::runtime::{Instance, Residency, Scene, Similarity, SplatList, ViewId};
 use gigalod_synth::{Order, PathKind, PathOptions, StatueOptions, camera_path, write_statue};
 use std::io::Cursor;
 use std::sync::Arc;
@@ -20,7 +20,7 @@ const MIB: u64 = 1 << 20;
 const BESIDES: u64 = MIB;
 
 /// For each splat of the fullest frame: its 20 bytes, and as many again twice while the list grows.
-const LIST_BYTES: u64 = 3 * size_of::<SplatDraw>() as u64;
+const LIST_BYTES: u64 = 3 * SplatList::SPLAT_BYTES;
 
 #[test]
 fn a_flight_allocates_no_more_than_its_budget_and_its_lists() {

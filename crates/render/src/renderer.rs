@@ -6,7 +6,7 @@ use crate::readback::read_texture;
 use crate::splats::{Kernel, SplatBatch, SplatPass};
 use crate::{Gpu, Lighting, RenderError};
 use gigalod_geom::{Camera, ImageSize};
-use gigalod_runtime::{DrawSource, Similarity};
+use gigalod_runtime::{DrawSource, Similarity, SplatBall};
 
 /// How things are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -168,9 +168,8 @@ fn cleared(view: &wgpu::TextureView, color: wgpu::Color) -> wgpu::RenderPassColo
 fn near_plane(frame: &Frame<'_>) -> f64 {
     let farthest = frame.draws.iter().map(|(placement, source)| match source {
         DrawSource::Splats(splats) => {
-            let squared =
-                |splat: &gigalod_runtime::SplatDraw| glam::Vec3::from_array(splat.center_in_eye).length_squared();
-            f64::from(splats.iter().map(squared).fold(0.0, f32::max)).sqrt() * placement.scale
+            let squared = |ball: &SplatBall| glam::Vec3::from_array(ball.center_in_eye).length_squared();
+            f64::from(splats.iter().map(|(ball, _)| squared(ball)).fold(0.0, f32::max)).sqrt() * placement.scale
         }
         _ => 0.0,
     });

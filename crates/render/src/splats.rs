@@ -3,7 +3,8 @@
 use crate::gbuffer;
 use crate::shader;
 use gigalod_geom::Camera;
-use gigalod_runtime::{ModelView, Similarity, SplatDraw};
+use gigalod_runtime::splats::NormalColor;
+use gigalod_runtime::{ModelView, Similarity, SplatBall, SplatList};
 use glam::DVec3;
 
 pub(crate) const SOURCE: &str = include_str!("shader/splats.wgsl");
@@ -42,6 +43,18 @@ struct SplatParams {
     pad: [u32; 2],
 }
 
+/// The columns of a [`SplatList`], as the shader reads them.
+fn columns() -> [wgpu::VertexBufferLayout<'static>; 2] {
+    const BALL: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32];
+    const NORMAL_COLOR: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![2 => Uint32];
+    let column = |stride: usize, attributes| wgpu::VertexBufferLayout {
+        array_stride: stride as u64,
+        step_mode: wgpu::VertexStepMode::Instance,
+        attributes,
+    };
+    [column(size_of::<SplatBall>(), &BALL), column(size_of::<NormalColor>(), &NORMAL_COLOR)]
+}
+
 /// Draws lists of splats.
 #[derive(Debug)]
 pub(crate) struct SplatPass {
@@ -53,7 +66,8 @@ pub(crate) struct SplatPass {
 #[derive(Debug)]
 pub(crate) struct SplatBatch {
     bind_group: wgpu::BindGroup,
-    splats: wgpu::Buffer,
+    balls: wgpu::Buffer,
+    normal_colors: wgpu::Buffer,
     count: u32,
 }
 
@@ -85,11 +99,7 @@ impl SplatPass {
                 module: &module,
                 entry_point: Some("place"),
                 compilation_options: Default::default(),
-                buffers: &[Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<SplatDraw>() as u64,
-                    step_mode: wgpu::VertexStepMode::Instance,
-                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Uint32],
-                })],
+                buffers: &columns().map(Some),
             },
             primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
@@ -120,30 +130,41 @@ impl SplatPass {
         placement: &Similarity,
         kernel: Kernel,
         near: f64,
-        splats: &[SplatDraw],
+        splats: &SplatList,
     ) -> Vec<SplatBatch> {
         let params = SplatParams::new(camera, placement, kernel, near);
-        let most = device.limits().max_buffer_size.min(1 << 30) as usize / size_of::<SplatDraw>();
-        splats
-            .chunks(most.max(1))
-            .map(|splats| {
-                let uniform =
-                    buffer_with(device, "splat params", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&params));
-                let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some("splats"),
-                    layout: &self.layout,
-                    entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
-                });
-                let buffer = buffer_with(device, "splats", wgpu::BufferUsages::VERTEX, bytemuck::cast_slice(splats));
-                SplatBatch { bind_group, splats: buffer, count: splats.len() as u32 }
-            })
+        let most = device.limits().max_buffer_size.min(1 << 30) as usize / size_of::<SplatBall>();
+        let batch = |balls: &[SplatBall], normal_colors: &[NormalColor]| {
+            let uniform = buffer_with(device, "splat params", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&params));
+            let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("splats"),
+                layout: &self.layout,
+                entries: &[wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() }],
+            });
+            SplatBatch {
+                bind_group,
+                balls: buffer_with(device, "balls", wgpu::BufferUsages::VERTEX, bytemuck::cast_slice(balls)),
+                normal_colors: buffer_with(
+                    device,
+                    "normals and colours",
+                    wgpu::BufferUsages::VERTEX,
+                    bytemuck::cast_slice(normal_colors),
+                ),
+                count: balls.len() as u32,
+            }
+        };
+        let pieces = splats.pieces.iter();
+        pieces
+            .flat_map(|piece| piece.balls.chunks(most.max(1)).zip(piece.normal_colors.chunks(most.max(1))))
+            .map(|(balls, normal_colors)| batch(balls, normal_colors))
             .collect()
     }
 
     pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SplatBatch) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &batch.bind_group, &[]);
-        pass.set_vertex_buffer(0, batch.splats.slice(..));
+        pass.set_vertex_buffer(0, batch.balls.slice(..));
+        pass.set_vertex_buffer(1, batch.normal_colors.slice(..));
         pass.draw(0..4, 0..batch.count);
     }
 }
@@ -151,7 +172,7 @@ impl SplatPass {
 impl SplatBatch {
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        self.splats.size()
+        self.balls.size() + self.normal_colors.size()
     }
 }
 
@@ -209,14 +230,11 @@ mod tests {
     }
 
     #[test]
-    fn a_splat_is_five_words_in_the_order_of_the_vertex_attributes() {
-        assert_eq!(size_of::<SplatDraw>(), 20);
-        let offsets = [
-            std::mem::offset_of!(SplatDraw, center_in_eye),
-            std::mem::offset_of!(SplatDraw, radius),
-            std::mem::offset_of!(SplatDraw, normal_color),
-        ];
-        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Uint32];
-        assert_eq!(offsets.map(|at| at as u64), attributes.map(|attribute| attribute.offset));
+    fn the_columns_of_a_list_are_vertex_buffers() {
+        let [balls, normal_colors] = columns();
+        assert_eq!((size_of::<SplatBall>(), size_of::<NormalColor>()), (16, 4));
+        let offsets = [std::mem::offset_of!(SplatBall, center_in_eye), std::mem::offset_of!(SplatBall, radius)];
+        assert_eq!(offsets.map(|at| at as u64).as_slice(), [0, 1].map(|at: usize| balls.attributes[at].offset));
+        assert_eq!((balls.array_stride, normal_colors.array_stride), (16, 4));
     }
 }

@@ -21,5 +21,5 @@ pub use report::{CutReport, Limit};
 pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};
 pub use scene::{Instance, Scene};
 pub use selection::{DeviceDraw, DrawSource, RequestRing, SelectInput, Selection, Selector, Target};
-pub use splats::{SplatDraw, SplatSelector};
+pub use splats::{SplatBall, SplatList, SplatSelector};
 pub use view::{InstanceId, ModelView, Similarity, ViewId};

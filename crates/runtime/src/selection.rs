@@ -1,7 +1,7 @@
 //! The seam between what is resident and what is drawn.
 
 use crate::residency::{FileId, PageRequest, Residency};
-use crate::splats::SplatDraw;
+use crate::splats::SplatList;
 use crate::{CutReport, InstanceId, ModelView, ViewId};
 use std::collections::VecDeque;
 
@@ -39,13 +39,19 @@ pub struct DeviceDraw {
 #[non_exhaustive]
 pub enum DrawSource {
     /// A list of splats on the host.
-    Splats(Vec<SplatDraw>),
+    Splats(SplatList),
     /// A list that already lies on the device.
     OnDevice(DeviceDraw),
 }
 
+impl Default for DrawSource {
+    fn default() -> Self {
+        Self::Splats(SplatList::default())
+    }
+}
+
 /// What a selector answers. Reused from frame to frame, so that a warm frame allocates nothing.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Selection {
     /// To draw now.
     pub draw: DrawSource,
@@ -53,12 +59,6 @@ pub struct Selection {
     pub requests: Vec<PageRequest>,
     /// Figures.
     pub report: CutReport,
-}
-
-impl Default for Selection {
-    fn default() -> Self {
-        Self { draw: DrawSource::Splats(Vec::new()), requests: Vec::new(), report: CutReport::default() }
-    }
 }
 
 /// Turns (hierarchy, instance, view, residency) into a draw source and page requests.

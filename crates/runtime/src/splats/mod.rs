@@ -2,26 +2,16 @@
 //!
 //! Source: the splats paper, section 2.1, `TraverseHierarchy`.
 
+mod list;
 mod traverse;
 
+pub use list::{NormalColor, SplatBall, SplatList, SplatPiece};
 pub use traverse::{Culled, CutSink, Cutting, VisitedNode, Work, cut};
 
 use crate::residency::{PageKey, PageRequest};
 use crate::selection::{DrawSource, SelectInput, Selection, Selector, Target};
 use gigalod_geom::color::rgb565_of_srgb8;
 use std::collections::BTreeMap;
-
-/// One splat, ready for the GPU. WGSL twin: `shader/splats.wgsl` of the render crate.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct SplatDraw {
-    /// Centre of the ball, relative to the eye; the model's axes and units.
-    pub center_in_eye: [f32; 3],
-    /// Radius of the ball; the model's units.
-    pub radius: f32,
-    /// Normal (14 bits, lowest) and colour (5-6-5, highest 16 bits).
-    pub normal_color: u32,
-}
 
 /// Where a splat's colour comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,14 +38,17 @@ pub struct SplatSelector {
 
 impl Selector for SplatSelector {
     fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) {
-        let mut splats = match std::mem::replace(&mut out.draw, DrawSource::Splats(Vec::new())) {
+        let mut splats = match std::mem::take(&mut out.draw) {
             DrawSource::Splats(splats) => splats,
-            DrawSource::OnDevice(_) => Vec::new(),
+            DrawSource::OnDevice(_) => SplatList::default(),
         };
         splats.clear();
+        if splats.pieces.is_empty() {
+            splats.pieces.push(SplatPiece::default());
+        }
         out.requests.clear();
         let work = self.states.entry(target).or_default();
-        let mut sink = DrawSink { splats: &mut splats, requests: &mut out.requests, tint: self.tint, input };
+        let mut sink = DrawSink { splats: &mut splats.pieces[0], requests: &mut out.requests, tint: self.tint, input };
         out.report = cut(input, &self.cutting, work, &mut sink);
         // Siblings ask for the same page one after the other: sum up before residency has to.
         out.requests.sort_by_key(|request| request.key);
@@ -76,7 +69,7 @@ impl Selector for SplatSelector {
 
 /// Collects what is drawn and what is missing.
 struct DrawSink<'a> {
-    splats: &'a mut Vec<SplatDraw>,
+    splats: &'a mut SplatPiece,
     requests: &'a mut Vec<PageRequest>,
     tint: Tint,
     input: &'a SelectInput<'a>,
@@ -88,11 +81,8 @@ impl CutSink for DrawSink<'_> {
             Tint::Model => node.color.unwrap_or(const { packed_material() }),
             Tint::Level => level_color(node.level),
         };
-        self.splats.push(SplatDraw {
-            center_in_eye: node.center_in_eye.to_array(),
-            radius: node.radius,
-            normal_color: u32::from(node.node.normal()) | u32::from(color) << 16,
-        });
+        let ball = SplatBall { center_in_eye: node.center_in_eye.to_array(), radius: node.radius };
+        self.splats.push(ball, u32::from(node.node.normal()) | u32::from(color) << 16);
     }
 
     fn miss(&mut self, page: gigalod_format::splats::PageId, benefit: f32) {
