@@ -12,7 +12,7 @@ use gigalod_geom::{Aabb, Camera, ImageSize};
 use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Instance, Limit, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{CutReport, Fineness, Instance, Limit, Residency, Scene, Similarity, ViewId};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -111,6 +111,7 @@ impl Stage {
         let mut residency = Residency::new(cpu_budget, Box::new(loader));
         let id = residency.add(Arc::new(splats));
         let mut scene = Scene::new(residency);
+        scene.set_cpu_budget(cpu_budget);
         scene.add(Instance { file: id, placement: Similarity::IDENTITY });
         let renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
         Ok(Self { scene, renderer, up })
@@ -131,10 +132,10 @@ impl Stage {
         const CAMERA: ViewId = ViewId(0);
         self.scene.splats_mut().tint = job.tint;
         let threshold_px = job.threshold_px as f32;
-        self.scene.select_converged(CAMERA, &job.camera, threshold_px);
+        self.scene.select_converged(CAMERA, &job.camera, &Fineness::px(threshold_px));
         // Once more with everything there: the time that a warm cut takes.
         let begun = Instant::now();
-        let report = self.scene.select(CAMERA, &job.camera, threshold_px);
+        let report = self.scene.select(CAMERA, &job.camera, &Fineness::px(threshold_px));
         let select_ms = begun.elapsed().as_secs_f64() * 1e3;
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
@@ -177,7 +178,7 @@ impl Stage {
         problems: Vec<String>,
     ) -> RenderReport {
         let residency = self.scene.residency();
-        let complete = !residency.is_full() && problems.is_empty();
+        let complete = !residency.is_full() && report.limited_by != Some(Limit::Budget) && problems.is_empty();
         RenderReport {
             width: job.camera.size.width,
             height: job.camera.size.height,
@@ -189,7 +190,7 @@ impl Stage {
             drawn: Drawn { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
             culled: Culled { frustum: report.culled_frustum, backface: report.culled_backface },
             bytes_read: residency.bytes_read(),
-            cpu_bytes: residency.resident_bytes(),
+            cpu_bytes: self.scene.cpu_bytes(),
             gpu_bytes: self.renderer.gpu_bytes(),
             select_ms,
             frame_ms,
