@@ -33,7 +33,9 @@ fn main() {
         let only = rest.get(1).map(String::as_str);
         for (pose, zoom) in [("default", 1.0), ("close", 6.0), ("inside", 300.0)] {
             for threshold_px in [0.0, 0.5, 1.0, 4.0] {
-                if threshold_px == 0.0 && pose == "inside" || only.is_some_and(|only| only != format!("{pose}{threshold_px}x{threads}")) {
+                if threshold_px == 0.0 && pose == "inside"
+                    || only.is_some_and(|only| only != format!("{pose}{threshold_px}x{threads}"))
+                {
                     continue;
                 }
                 lines.push(measure(&file, threads, (pose, zoom), threshold_px, seconds));
@@ -44,7 +46,13 @@ fn main() {
 }
 
 /// One line: warm cuts of one pose.
-fn measure(file: &Arc<SplatFile>, threads: usize, (pose, zoom): (&str, f64), threshold_px: f32, seconds: f64) -> String {
+fn measure(
+    file: &Arc<SplatFile>,
+    threads: usize,
+    (pose, zoom): (&str, f64),
+    threshold_px: f32,
+    seconds: f64,
+) -> String {
     let mut residency = Residency::new(16 << 30, Box::new(ThreadedLoader::new(2).expect("threads")));
     let id = residency.add(file.clone());
     let mut scene = Scene::new(residency);

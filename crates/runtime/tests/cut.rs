@@ -7,7 +7,9 @@ use gigalod_format::splats::page::CODEC_RAW;
 use gigalod_format::splats::{PageContents, PageId, PageRecord, Skeleton, SplatFile, WordIndex};
 use gigalod_runtime::splats::Cutting;
 use gigalod_runtime::splats::plain::{Culled, CutSink, VisitedNode, Work, cut};
-use gigalod_runtime::{CutReport, FileId, Fineness, Interrupt, Limit, ModelView, Scene, SelectInput, Similarity, ViewId};
+use gigalod_runtime::{
+    CutReport, FileId, Fineness, Interrupt, Limit, ModelView, Scene, SelectInput, Similarity, ViewId,
+};
 use std::collections::BTreeMap;
 
 /// Where a node is stored.

@@ -216,7 +216,9 @@ impl Residency {
             self.incoming_bytes -= self.bytes_to_come(key);
             match page {
                 // Asked for when there was more room.
-                Ok(page) if self.resident_bytes + self.incoming_bytes + page.resident_bytes() as u64 > self.budget_bytes => {
+                Ok(page)
+                    if self.resident_bytes + self.incoming_bytes + page.resident_bytes() as u64 > self.budget_bytes =>
+                {
                     self.refused += 1;
                 }
                 Ok(page) => {
@@ -268,8 +270,8 @@ impl Residency {
     pub fn directory_bytes(&self) -> u64 {
         let entry = size_of::<Option<Arc<Page>>>() + size_of::<AtomicU32>();
         let pages = self.files.iter().map(|pages| pages.table.resident.len() * entry).sum::<usize>();
-        let lists = self.wanted.capacity() * size_of::<PageRequest>()
-            + self.idle.capacity() * size_of::<(u32, PageKey, u64)>();
+        let lists =
+            self.wanted.capacity() * size_of::<PageRequest>() + self.idle.capacity() * size_of::<(u32, PageKey, u64)>();
         (pages + lists) as u64
     }
 

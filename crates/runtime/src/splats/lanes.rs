@@ -79,7 +79,11 @@ impl Decided {
 
     /// What is known of the children of the node in `lane`.
     pub(super) fn known_below(&self, lane: u32) -> Known {
-        Known((self.inside >> lane & 1) as u8 | ((self.toward >> lane & 1) << 1) as u8 | ((self.away >> lane & 1) << 2) as u8)
+        Known(
+            (self.inside >> lane & 1) as u8
+                | ((self.toward >> lane & 1) << 1) as u8
+                | ((self.away >> lane & 1) << 2) as u8,
+        )
     }
 }
 

@@ -46,7 +46,8 @@ impl SplatPiece {
 
     /// Bytes that it keeps.
     pub fn bytes(&self) -> u64 {
-        (self.balls.capacity() * size_of::<SplatBall>() + self.normal_colors.capacity() * size_of::<NormalColor>()) as u64
+        (self.balls.capacity() * size_of::<SplatBall>() + self.normal_colors.capacity() * size_of::<NormalColor>())
+            as u64
     }
 
     /// Appends a splat.
