@@ -52,7 +52,7 @@ const WORTH_THREADS: u64 = 50_000;
 const CHUNKS_PER_THREAD: usize = 8;
 
 /// Groups among which chunks are cut.
-const GROUPS_PER_CHUNK: usize = 16;
+const GROUPS_PER_CHUNK: usize = 8;
 
 /// Cuts splat hierarchies on the host.
 #[derive(Debug)]
@@ -222,6 +222,7 @@ impl SplatSelector {
             stop: AtomicBool::new(false),
             free: Mutex::new((std::mem::take(&mut self.free), input.room_bytes)),
             no_room: AtomicBool::new(false),
+            wanted_before: self.wanted.len(),
         };
         let cut = self.work(cut, together);
         self.items = cut.items;

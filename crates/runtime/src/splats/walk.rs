@@ -58,6 +58,8 @@ pub(super) struct Cut {
     /// Empty pieces, and bytes that may be allocated for more.
     pub(super) free: Mutex<(Vec<SplatPiece>, u64)>,
     pub(super) no_room: AtomicBool,
+    /// Pages that were wanted last time.
+    pub(super) wanted_before: usize,
 }
 
 impl Cut {
@@ -133,6 +135,13 @@ impl Worker {
         (fixed + grown) as u64
     }
 
+    /// Has room for a whole cut like the last one, whichever part of this one it will do.
+    pub(super) fn reserve(&mut self, cut: &Cut) {
+        let free = cut.free.lock().unwrap_or_else(PoisonError::into_inner).0.len();
+        self.pieces.reserve(free);
+        self.wanted.reserve(cut.wanted_before * 2);
+    }
+
     /// Prepares for a new cut.
     pub(super) fn begin(&mut self) {
         self.stack.clear();
@@ -145,6 +154,9 @@ impl Worker {
     /// Splits the work: replaces groups by themselves and what is below them, level by level, until there are enough.
     pub(super) fn split(&mut self, cut: &Cut, enough: usize, items: &mut Vec<Item>, scratch: &mut Vec<Item>) {
         self.begin();
+        // The last round may make four of each, and has itself beside them.
+        items.reserve(enough * 6);
+        scratch.reserve(enough * 6);
         let mut consistent = true;
         loop {
             let whole = items.iter().filter(|item| item.whole).count();
@@ -394,6 +406,7 @@ mod tests {
             stop: AtomicBool::new(false),
             free: Mutex::new((Vec::new(), u64::MAX)),
             no_room: AtomicBool::new(false),
+            wanted_before: 0,
         };
         let mut worker = Worker::new();
         worker.item(&cut, 0, &cut.items[0]).unwrap();
