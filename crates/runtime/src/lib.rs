@@ -10,6 +10,7 @@
 //! requests come back through a [`RequestRing`], frames later. Residency never asks who made a request.
 #![forbid(unsafe_code)]
 
+pub mod controller;
 pub mod report;
 pub mod residency;
 pub mod scene;
@@ -17,9 +18,10 @@ pub mod selection;
 pub mod splats;
 pub mod view;
 
+pub use controller::FrameRate;
 pub use report::{CutReport, Limit};
 pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};
-pub use scene::{Instance, Scene};
+pub use scene::{Fineness, Instance, Scene};
 pub use selection::{DeviceDraw, DrawSource, RequestRing, SelectInput, Selection, Selector, Target};
 pub use splats::{SplatBall, SplatList, SplatSelector};
 pub use view::{InstanceId, ModelView, Similarity, ViewId};

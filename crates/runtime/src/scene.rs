@@ -15,6 +15,15 @@ pub struct Instance {
     pub placement: Similarity,
 }
 
+/// How fine a view is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fineness {
+    /// Largest error on screen, in pixels; 0 for everything there is.
+    pub threshold_px: f32,
+    /// Most splats, over all instances; a cut that would have more is made coarser.
+    pub most_splats: u64,
+}
+
 /// Models in their places.
 #[derive(Debug)]
 pub struct Scene {
