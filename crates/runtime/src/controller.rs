@@ -38,8 +38,8 @@ pub struct FrameRate {
     cost: CostModel,
     /// Threshold while the camera moves.
     moving_px: f32,
-    /// Threshold of the last frame drawn.
-    shown_px: f32,
+    /// Threshold that the last frame was to have; while the camera moves, the one that it had.
+    asked_px: f32,
     resting: bool,
     /// The last frame showed all there is at the finest threshold.
     settled: bool,
@@ -54,7 +54,7 @@ impl FrameRate {
             finest_px,
             cost: CostModel::default(),
             moving_px: first_px,
-            shown_px: first_px,
+            asked_px: first_px,
             resting: false,
             settled: false,
         }
@@ -64,23 +64,24 @@ impl FrameRate {
     pub fn next(&mut self, moved: bool) -> Fineness {
         self.resting = !moved;
         if self.resting {
-            return Fineness { threshold_px: (self.shown_px * REST_STEP).max(self.finest_px), most_splats: u64::MAX };
+            self.asked_px = (self.asked_px * REST_STEP).max(self.finest_px);
+            return Fineness { threshold_px: self.asked_px, most_splats: u64::MAX };
         }
         let affordable = self.cost.splats_within(self.target_ms);
         let most_splats = affordable.map_or(FIRST_SPLATS, |splats| (splats * CUT_BOUND) as u64);
         Fineness { threshold_px: self.moving_px, most_splats: most_splats.max(1) }
     }
 
-    /// Takes note of a frame: how long it took from beginning to end, the threshold it was really cut at, and what it drew.
-    pub fn drew(&mut self, frame_ms: f64, threshold_px: f32, report: &CutReport) {
-        self.shown_px = threshold_px;
+    /// Takes note of a frame: how long it took from beginning to end, the threshold it was really cut at, what it drew, and
+    /// whether finer pages are on their way.
+    pub fn drew(&mut self, frame_ms: f64, threshold_px: f32, report: &CutReport, loading: bool) {
         self.cost.learn(report.drawn as f64, frame_ms);
-        self.settled =
-            self.resting && threshold_px <= self.finest_px && report.limited_by.is_none_or(|limit| limit.is_final());
+        // Where a budget does not allow the finest, this is as fine as it gets.
+        self.settled = self.resting && self.asked_px <= self.finest_px && !loading;
         if self.resting {
             return;
         }
-        self.moving_px = threshold_px;
+        (self.moving_px, self.asked_px) = (threshold_px, threshold_px);
         let Some(affordable) = self.cost.splats_within(self.target_ms) else { return };
         if (frame_ms / self.target_ms - 1.0).abs() <= DEAD_BAND {
             return;
@@ -165,7 +166,6 @@ impl CostModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Limit;
 
     /// A machine that takes `fixed_ms`, and for each splat `splat_ms`; and a view with `detail` splats at one pixel.
     struct Machine {
@@ -186,7 +186,7 @@ mod tests {
             self.frames += 1;
             let noise = 1.0 + self.noise * f64::from(self.frames).sin();
             let ms = (self.fixed_ms + self.splat_ms * splats(px)) * noise;
-            control.drew(ms, px, &CutReport { drawn: splats(px) as u64, ..CutReport::default() });
+            control.drew(ms, px, &CutReport { drawn: splats(px) as u64, ..CutReport::default() }, false);
             (ms, px)
         }
     }
@@ -217,7 +217,7 @@ mod tests {
         for _ in 0..30 {
             machine.draw(&mut control, 2e6, true);
         }
-        let mut last = control.shown_px;
+        let mut last = control.asked_px;
         assert!(last > 4.0, "{last}");
         let mut frames = 0;
         while !control.is_settled() {
@@ -235,10 +235,10 @@ mod tests {
     #[test]
     fn what_is_still_being_loaded_is_waited_for() {
         let mut control = FrameRate::new(50.0, 1.0);
-        for limited_by in [Some(Limit::Residency), Some(Limit::Data), None] {
-            control.next(false);
-            control.drew(10.0, 1.0, &CutReport { limited_by, ..CutReport::default() });
-            assert_eq!(control.is_settled(), limited_by != Some(Limit::Residency));
+        for loading in [true, false] {
+            (0..20).for_each(|_| assert!(control.next(false).threshold_px >= 1.0));
+            control.drew(10.0, 1.0, &CutReport::default(), loading);
+            assert_eq!(control.is_settled(), !loading);
         }
     }
 

@@ -12,11 +12,6 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// True where waiting would not make it finer.
-    pub fn is_final(self) -> bool {
-        self != Self::Residency
-    }
-
     /// As in JSON.
     pub fn name(self) -> &'static str {
         match self {

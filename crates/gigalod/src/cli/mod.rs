@@ -1,6 +1,7 @@
 //! Parses the arguments, runs one command, and reports how it went.
 
 pub(crate) mod args;
+mod bench;
 mod build;
 mod cache;
 mod compare;
@@ -12,6 +13,7 @@ mod parse;
 mod path_file;
 mod progress;
 mod render;
+mod stage;
 mod synth;
 mod usage;
 mod verify;
@@ -55,6 +57,7 @@ pub(crate) fn run() -> ExitCode {
     let outcome = match &cli.command {
         Command::Build(args) => build::run(args, &console),
         Command::Render(args) => render::run(args, &console),
+        Command::Bench(args) => bench::run(args, &console),
         Command::Info(args) => info::run(args, &console),
         Command::Verify(args) => verify::run(args, &console),
         Command::Compare(args) => compare::run(args, &console),

@@ -1,21 +1,19 @@
 //! `gigalod render`.
 
-use super::args::{CameraArgs, KernelArg, RenderArgs};
+use super::args::{CameraArgs, RenderArgs};
 use super::cache;
 use super::error::{CliError, Outcome};
 use super::files;
 use super::path_file;
 use super::progress::Console;
-use gigalod_format::splats::SplatFile;
+use super::stage::{CAMERA, Stage};
 use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
 use gigalod_geom::{Aabb, Camera, ImageSize};
-use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
-use gigalod_runtime::residency::ThreadedLoader;
+use gigalod_render::{Look, Picture};
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Instance, Limit, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{CutReport, Limit};
 use serde::Serialize;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// The JSON object of `render`.
@@ -63,13 +61,6 @@ pub(crate) struct Job<'a> {
     pub(crate) depth: Option<&'a Path>,
 }
 
-/// A model open for drawing.
-pub(crate) struct Stage {
-    scene: Scene,
-    renderer: Renderer,
-    up: UpAxis,
-}
-
 pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliError> {
     if args.depth.as_ref() == Some(&args.output) {
         return Err(CliError::usage("the picture and its depth in one file, expected two"));
@@ -81,19 +72,13 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
     }
     files::check_png_name(&args.output)?;
     let file = cache::container_of(&args.file, &args.build, console)?;
-    let mut stage = Stage::open(&file, args.cpu_budget)?;
-    let camera = camera(&args.camera, args.size, &stage.bounds(), stage.up)?;
+    let mut stage = Stage::open(&file, args.draw.cpu_budget)?;
+    let camera = camera(&args.camera, args.draw.size, &stage.bounds(), stage.up())?;
     let job = Job {
         camera,
-        threshold_px: if args.full { 0.0 } else { args.error.unwrap_or(1.0) },
-        look: Look {
-            kernel: match args.kernel {
-                KernelArg::Square => Kernel::Square,
-                KernelArg::Round => Kernel::Round,
-            },
-            lighting: Lighting { towards_light: args.light, background: args.background },
-        },
-        tint: if args.lod_colors { Tint::Level } else { Tint::Model },
+        threshold_px: args.draw.threshold_px(),
+        look: args.draw.look(),
+        tint: args.draw.tint(),
         output: &args.output,
         depth: args.depth.as_deref(),
     };
@@ -101,34 +86,8 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
 }
 
 impl Stage {
-    /// Opens a `.glod` file and the graphics device.
-    pub(crate) fn open(file: &Path, cpu_budget: u64) -> Result<Self, CliError> {
-        let splats: SplatFile = files::open_splats(file)?;
-        let up = splats.skeleton().root().up;
-        let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get()).min(4);
-        let loader = ThreadedLoader::new(threads)
-            .map_err(|error| CliError::new(format!("could not start loading threads: {error}")))?;
-        let mut residency = Residency::new(cpu_budget, Box::new(loader));
-        let id = residency.add(Arc::new(splats));
-        let mut scene = Scene::new(residency);
-        scene.add(Instance { file: id, placement: Similarity::IDENTITY });
-        let renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
-        Ok(Self { scene, renderer, up })
-    }
-
-    /// Around the model.
-    pub(crate) fn bounds(&self) -> Aabb {
-        self.scene.bounds()
-    }
-
-    /// Which way is up.
-    pub(crate) fn up(&self) -> UpAxis {
-        self.up
-    }
-
     /// Draws one picture and writes it; `name` is what messages call the model.
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
-        const CAMERA: ViewId = ViewId(0);
         self.scene.splats_mut().tint = job.tint;
         let threshold_px = job.threshold_px as f32;
         self.scene.select_converged(CAMERA, &job.camera, threshold_px);
@@ -136,27 +95,14 @@ impl Stage {
         let begun = Instant::now();
         let report = self.scene.select(CAMERA, &job.camera, threshold_px);
         let select_ms = begun.elapsed().as_secs_f64() * 1e3;
-        let draws =
-            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-        let frame = Frame { camera: job.camera, look: job.look, draws };
-        let picture = self.renderer.picture(&frame).map_err(graphics_error)?;
+        let picture = self.picture(&job.camera, job.look)?;
         let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
 
         files::write_png(job.output, picture.size, &picture.rgba)?;
         if let Some(depth) = job.depth {
             write_depth(depth, &picture)?;
         }
-        let residency = self.scene.residency();
-        let mut problems: Vec<String> = residency
-            .damaged()
-            .map(|(_, why)| CliError::in_file(name, why).to_string().replacen("error: ", "", 1))
-            .collect();
-        if report.inconsistent {
-            problems.push(format!("{}: the tree contradicts itself, parts may be missing", name.display()));
-        }
-        for problem in &problems {
-            console.warn(&CliError::new(problem));
-        }
+        let problems = self.problems(name, &report, console);
         let json = self.report(job, &report, select_ms, frame_ms, problems);
         let text = format!(
             "{}: {} splats, {}, in {frame_ms:.0} ms on {}\n",
@@ -230,16 +176,6 @@ fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, up: UpAxis) -> Resu
     }
     let [azimuth, elevation, zoom] = args.orbit.unwrap_or([0.0, 0.0, 1.0]);
     Ok(Camera::orbit(bounds, up, [azimuth, elevation], zoom, fov_rad(args.fov), size))
-}
-
-fn graphics_error(error: RenderError) -> CliError {
-    let error_line = CliError::new(&error);
-    match error {
-        RenderError::NoAdapter(_) => {
-            error_line.hint("install a Vulkan driver, as mesa-vulkan-drivers and libvulkan1 on Debian and Ubuntu")
-        }
-        _ => error_line,
-    }
 }
 
 fn write_depth(path: &Path, picture: &Picture) -> Result<(), CliError> {
