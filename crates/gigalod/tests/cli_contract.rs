@@ -55,7 +55,8 @@ fn bench_reports_exactly_the_keys_of_the_contract() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("turn.json");
     run!["synth", "path", "sudden-turn", "--around", statue().glod, "-o", path, "--seconds", "0.5"].done();
-    const FRAMES: &str = "frames[{frame_ms max_error_px page_misses points select_ms t threshold_px triangles upload_bytes}]";
+    const FRAMES: &str =
+        "frames[{frame_ms max_error_px page_misses points select_ms t threshold_px triangles upload_bytes}]";
     let ran = run!["bench", statue().glod, "--path", path, "--size", "64x36", "--json"].done();
     let json = ran.json();
     assert_eq!(
@@ -213,7 +214,9 @@ fn wrong_usage_ends_with_status_2_and_says_what_is_wrong() {
         assert_eq!(shape(&ran.json()), "{error{file what where}}", "{arguments:?}");
         let what = ran.json()["error"]["what"].as_str().unwrap().to_string();
         assert!(what.contains(mentioned), "{arguments:?}: {what:?} mentions {mentioned:?}");
+        let others: Vec<&str> = ran.stderr.lines().skip(1).collect();
         assert!(ran.stderr.starts_with("error: "), "{arguments:?}: {ran:?}");
+        assert!(others.iter().all(|line| line.starts_with("hint: ")), "{arguments:?}: {ran:?}");
         let plain = cli_support::gigalod(&arguments);
         assert_eq!((plain.status, &*plain.stdout), (2, ""), "{arguments:?}");
     }
