@@ -65,23 +65,22 @@ impl FrameRate {
         self.resting = !moved;
         if self.resting {
             self.asked_px = (self.asked_px * REST_STEP).max(self.finest_px);
-            return Fineness { threshold_px: self.asked_px, most_splats: u64::MAX };
+            return Fineness::px(self.asked_px);
         }
         let affordable = self.cost.splats_within(self.target_ms);
         let most_splats = affordable.map_or(FIRST_SPLATS, |splats| (splats * CUT_BOUND) as u64);
         Fineness { threshold_px: self.moving_px, most_splats: most_splats.max(1) }
     }
 
-    /// Takes note of a frame: how long it took from beginning to end, the threshold it was really cut at, what it drew, and
-    /// whether finer pages are on their way.
-    pub fn drew(&mut self, frame_ms: f64, threshold_px: f32, report: &CutReport, loading: bool) {
+    /// Takes note of a frame: how long it took from beginning to end, what it drew, and whether finer pages are on their way.
+    pub fn drew(&mut self, frame_ms: f64, report: &CutReport, loading: bool) {
         self.cost.learn(report.drawn as f64, frame_ms);
         // Where a budget does not allow the finest, this is as fine as it gets.
         self.settled = self.resting && self.asked_px <= self.finest_px && !loading;
         if self.resting {
             return;
         }
-        (self.moving_px, self.asked_px) = (threshold_px, threshold_px);
+        (self.moving_px, self.asked_px) = (report.threshold_px, report.threshold_px);
         let Some(affordable) = self.cost.splats_within(self.target_ms) else { return };
         if (frame_ms / self.target_ms - 1.0).abs() <= DEAD_BAND {
             return;
@@ -89,7 +88,7 @@ impl FrameRate {
         let surplus = report.drawn.max(1) as f64 / affordable.max(1.0);
         // A step is at most an octave: beyond that the count says little.
         let step = surplus.powf(1.0 / SPLATS_EXPONENT).clamp(0.5, 2.0);
-        self.moving_px = (threshold_px * step as f32).max(self.finest_px);
+        self.moving_px = (report.threshold_px * step as f32).max(self.finest_px);
     }
 
     /// True when drawing again would draw the same.
@@ -186,7 +185,8 @@ mod tests {
             self.frames += 1;
             let noise = 1.0 + self.noise * f64::from(self.frames).sin();
             let ms = (self.fixed_ms + self.splat_ms * splats(px)) * noise;
-            control.drew(ms, px, &CutReport { drawn: splats(px) as u64, ..CutReport::default() }, false);
+            let report = CutReport { drawn: splats(px) as u64, threshold_px: px, ..CutReport::default() };
+            control.drew(ms, &report, false);
             (ms, px)
         }
     }
@@ -237,7 +237,7 @@ mod tests {
         let mut control = FrameRate::new(50.0, 1.0);
         for loading in [true, false] {
             (0..20).for_each(|_| assert!(control.next(false).threshold_px >= 1.0));
-            control.drew(10.0, 1.0, &CutReport::default(), loading);
+            control.drew(10.0, &CutReport::default(), loading);
             assert_eq!(control.is_settled(), !loading);
         }
     }

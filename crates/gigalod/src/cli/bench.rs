@@ -104,9 +104,9 @@ impl Run<'_> {
     fn each_pose(&mut self, console: &Console) -> Result<usize, CliError> {
         let work = console.work("bench");
         work.begin("draw", self.path.frames.len() as u64);
-        let wanted = Fineness { threshold_px: self.args.draw.threshold_px() as f32, most_splats: u64::MAX };
+        let wanted = Fineness::px(self.args.draw.threshold_px() as f32);
         for index in 0..self.path.frames.len() {
-            self.frame(self.path.frames[index].t, wanted)?;
+            self.frame(self.path.frames[index].t, &wanted)?;
             work.at(index as u64 + 1);
         }
         Ok(self.frames.len())
@@ -142,21 +142,21 @@ impl Run<'_> {
     }
 
     fn paced_frame(&mut self, t: f64, moved: bool, control: &mut FrameRate) -> Result<(), CliError> {
-        self.frame(t, control.next(moved))?;
+        self.frame(t, &control.next(moved))?;
         let drawn = self.frames.last().expect("a frame was just drawn");
-        control.drew(drawn.frame_ms, drawn.threshold_px, &self.last, self.stage.scene.residency().is_loading());
+        control.drew(drawn.frame_ms, &self.last, self.stage.scene.residency().is_loading());
         Ok(())
     }
 
     /// One frame of what is resident now.
-    fn frame(&mut self, t: f64, wanted: Fineness) -> Result<(), CliError> {
+    fn frame(&mut self, t: f64, wanted: &Fineness) -> Result<(), CliError> {
         let pose = self.path.at(t);
         let fov = self.args.fov.unwrap_or(self.path.fov_deg).to_radians();
         let camera = Camera::look_at(pose.eye, pose.target, self.path.up, fov, self.args.draw.size);
         let begun = Instant::now();
         let scene = &mut self.stage.scene;
         scene.residency_mut().receive(false);
-        self.last = scene.select(CAMERA, &camera, wanted.threshold_px);
+        self.last = scene.select(CAMERA, &camera, wanted);
         let page_misses = scene.draws(CAMERA).map(|(_, selection)| selection.requests.len() as u64).sum();
         scene.serve();
         let select_ms = begun.elapsed().as_secs_f64() * 1e3;
@@ -168,7 +168,7 @@ impl Run<'_> {
             upload_bytes: self.last.drawn * 20,
             triangles: 0,
             points: self.last.drawn,
-            threshold_px: wanted.threshold_px,
+            threshold_px: self.last.threshold_px,
             max_error_px: self.last.max_error_px.is_finite().then_some(self.last.max_error_px),
             page_misses,
         });

@@ -11,7 +11,7 @@ use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use gigalod_render::{Look, Picture};
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Limit};
+use gigalod_runtime::{CutReport, Fineness, Limit};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -90,10 +90,10 @@ impl Stage {
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
         self.scene.splats_mut().tint = job.tint;
         let threshold_px = job.threshold_px as f32;
-        self.scene.select_converged(CAMERA, &job.camera, threshold_px);
+        self.scene.select_converged(CAMERA, &job.camera, &Fineness::px(threshold_px));
         // Once more with everything there: the time that a warm cut takes.
         let begun = Instant::now();
-        let report = self.scene.select(CAMERA, &job.camera, threshold_px);
+        let report = self.scene.select(CAMERA, &job.camera, &Fineness::px(threshold_px));
         let select_ms = begun.elapsed().as_secs_f64() * 1e3;
         let picture = self.picture(&job.camera, job.look)?;
         let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
@@ -123,7 +123,7 @@ impl Stage {
         problems: Vec<String>,
     ) -> RenderReport {
         let residency = self.scene.residency();
-        let complete = !residency.is_full() && problems.is_empty();
+        let complete = !residency.is_full() && report.limited_by != Some(Limit::Budget) && problems.is_empty();
         RenderReport {
             width: job.camera.size.width,
             height: job.camera.size.height,
@@ -135,7 +135,7 @@ impl Stage {
             drawn: Drawn { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
             culled: Culled { frustum: report.culled_frustum, backface: report.culled_backface },
             bytes_read: residency.bytes_read(),
-            cpu_bytes: residency.resident_bytes(),
+            cpu_bytes: self.scene.cpu_bytes(),
             gpu_bytes: self.renderer.gpu_bytes(),
             select_ms,
             frame_ms,

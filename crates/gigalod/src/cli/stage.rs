@@ -35,6 +35,7 @@ impl Stage {
         let mut residency = Residency::new(cpu_budget, Box::new(loader));
         let id = residency.add(Arc::new(splats));
         let mut scene = Scene::new(residency);
+        scene.set_cpu_budget(cpu_budget);
         scene.add(Instance { file: id, placement: Similarity::IDENTITY });
         let renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
         Ok(Self { scene, renderer, up })

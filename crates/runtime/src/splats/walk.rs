@@ -1,0 +1,467 @@
+//! The fast traversal: what one thread does of a cut.
+//!
+//! In: a [`Cut`], which all threads share: the look, the pages, and *items*, groups from which subtrees hang, in the order of the
+//! tree. Out: pieces of the list, wanted pages, counts. Items come in *chunks*; who is free takes the next one.
+//! What always holds: a thread's pieces name their chunk, so the list is in the tree's order whoever made which; a warm worker
+//! allocates nothing; it looks whether it shall stop every [`CHECK_GROUPS`] groups, that is after at most four times as many nodes.
+
+use super::Tint;
+use super::lanes::{Decided, Known, Look, keep};
+use super::list::{SplatBall, SplatList, SplatPiece};
+use super::{level_color, packed_material};
+use crate::fineness::Interrupt;
+use crate::residency::PageTable;
+use crate::{CutReport, Limit};
+use gigalod_format::splats::{Node, Page, PageId, Root, WordIndex};
+use glam::Vec4;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// How often a traversal looks whether it shall stop.
+pub const CHECK_GROUPS: u32 = 256;
+
+/// Splats that a worker collects before it appends them to a piece.
+const BATCH: usize = 1024;
+
+/// What a page may be worth at most to one node.
+pub(super) const MOST_BENEFIT_PX: f32 = 1e6;
+
+/// Siblings still to be visited.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    /// Decoded ball of the parent: x, y, z, radius; local space.
+    pub(super) parent: Vec4,
+    pub(super) page: PageId,
+    /// Smallest diameter of all that is above: with a threshold from there on, the group is not visited.
+    pub(super) least_px: f32,
+    pub(super) word: WordIndex,
+    pub(super) level: u16,
+    pub(super) count: u8,
+    pub(super) known: Known,
+}
+
+/// A group as it is stored.
+pub(super) struct Stored<'a> {
+    page: &'a Page,
+    pub(super) words: [u32; 4],
+    /// The word behind the group.
+    pointer: Option<u32>,
+}
+
+/// Where the children of a group's nodes begin, if their page is there.
+pub(super) enum Below {
+    /// First word of the first child group.
+    At(PageId, WordIndex),
+    /// The page is not resident.
+    Missing(PageId),
+}
+
+/// The tree contradicts itself.
+#[derive(Debug)]
+pub(super) struct Inconsistent;
+
+impl<'a> Stored<'a> {
+    /// Reads a group.
+    #[inline(always)]
+    pub(super) fn read(table: &'a PageTable, group: &Group) -> Result<Self, Inconsistent> {
+        let page = table.get(group.page).ok_or(Inconsistent)?;
+        let (start, count) = (usize::from(group.word.0), usize::from(group.count));
+        let rest = page.words().get(start..).ok_or(Inconsistent)?;
+        if let Some(words) = rest.first_chunk::<5>() {
+            let [a, b, c, d, _] = *words;
+            return Ok(Self { page, words: [a, b, c, d], pointer: words.get(count).copied() });
+        }
+        let mut words = [0; 4];
+        words.iter_mut().zip(rest).for_each(|(word, stored)| *word = *stored);
+        if rest.len() < count { Err(Inconsistent) } else { Ok(Self { page, words, pointer: rest.get(count).copied() }) }
+    }
+
+    /// Lanes of nodes that have children.
+    #[inline(always)]
+    pub(super) fn inner(&self) -> u32 {
+        self.words.iter().enumerate().map(|(lane, word)| u32::from(!Node(*word).is_leaf()) << lane).sum()
+    }
+
+    /// Where the children are; marks their page as used in `frame`.
+    #[inline(always)]
+    pub(super) fn below(&self, table: &PageTable, frame: u32) -> Result<Below, Inconsistent> {
+        let family = self.page.family(self.pointer.ok_or(Inconsistent)?);
+        match table.used(family.page, frame) {
+            Some(page) => Ok(Below::At(family.page, page.family_word(family.family).ok_or(Inconsistent)?)),
+            None => Ok(Below::Missing(family.page)),
+        }
+    }
+
+    /// Puts the groups below the nodes in `open` on the stack.
+    #[inline(always)]
+    pub(super) fn push_open(
+        &self,
+        (page, first): (PageId, WordIndex),
+        group: &Group,
+        decided: &Decided,
+        open: u32,
+        stack: &mut Vec<Group>,
+    ) {
+        let balls = decided.local_balls();
+        let diameters = decided.diameter_px.to_array();
+        // Backwards, so that the first is visited first.
+        let mut word =
+            first.0.saturating_add(self.words.iter().map(|word| Node(*word).children().words() as u16).sum());
+        for lane in (0..4).rev() {
+            let children = Node(self.words[lane]).children();
+            word = word.wrapping_sub(children.words() as u16);
+            if open >> lane & 1 != 0 {
+                stack.push(Group {
+                    parent: balls[lane],
+                    page,
+                    least_px: group.least_px.min(diameters[lane]),
+                    word: WordIndex(word),
+                    level: group.level.saturating_add(1),
+                    count: children.count,
+                    known: decided.known_below(lane as u32),
+                });
+            }
+        }
+    }
+
+    /// 5-6-5 colours of four nodes.
+    #[inline(always)]
+    fn colors(&self, group: &Group, tint: Tint) -> [u16; 4] {
+        if tint == Tint::Level {
+            return [level_color(u32::from(group.level)); 4];
+        }
+        let mut colors = [const { packed_material() }; 4];
+        if let Some(rest) = self.page.colors().get(usize::from(group.word.0)..) {
+            match rest.first_chunk::<4>() {
+                Some(four) => colors = *four,
+                None => colors.iter_mut().zip(rest).for_each(|(color, stored)| *color = *stored),
+            }
+        }
+        colors
+    }
+}
+
+/// A part of the work, in the order of the tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Item {
+    group: Group,
+    /// With all that is below; else the group alone, because what is below are the next items.
+    whole: bool,
+}
+
+/// One cut, as all threads share it.
+#[derive(Debug)]
+pub(super) struct Cut {
+    pub(super) look: Look,
+    pub(super) table: Arc<PageTable>,
+    /// What pages are marked with.
+    pub(super) frame: u32,
+    pub(super) max_nodes: u64,
+    pub(super) tint: Tint,
+    pub(super) most_splats: u64,
+    /// Capacity of a new piece.
+    pub(super) piece_splats: usize,
+    pub(super) interrupt: Interrupt,
+    pub(super) items: Vec<Item>,
+    pub(super) chunks: u32,
+    pub(super) next_chunk: AtomicU32,
+    pub(super) drawn: AtomicU64,
+    pub(super) stop: AtomicBool,
+    /// Empty pieces, and bytes that may be allocated for more.
+    pub(super) free: Mutex<(Vec<SplatPiece>, u64)>,
+    pub(super) no_room: AtomicBool,
+}
+
+impl Cut {
+    /// True when nobody needs the rest.
+    fn is_over(&self) -> bool {
+        self.stop.load(Relaxed) || self.interrupt.is_set()
+    }
+
+    /// A used piece or a new one; none, and the cut is over, where that would be too much memory.
+    fn empty_piece(&self) -> Option<SplatPiece> {
+        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let (pieces, room_bytes) = &mut *free;
+        if let Some(piece) = pieces.pop() {
+            return Some(piece);
+        }
+        match room_bytes.checked_sub(self.piece_splats as u64 * SplatList::SPLAT_BYTES) {
+            Some(left) => *room_bytes = left,
+            None => {
+                self.no_room.store(true, Relaxed);
+                self.stop.store(true, Relaxed);
+                return None;
+            }
+        }
+        drop(free);
+        Some(SplatPiece::with_capacity(self.piece_splats))
+    }
+}
+
+/// What one thread keeps from cut to cut.
+#[derive(Debug)]
+pub(super) struct Worker {
+    stack: Vec<Group>,
+    balls: Box<[SplatBall; BATCH]>,
+    normal_colors: Box<[u32; BATCH]>,
+    /// Splats in the two of them.
+    filled: usize,
+    /// Filled pieces, with chunk and number.
+    pub(super) pieces: Vec<(u32, u32, SplatPiece)>,
+    /// Pages that are missing, and the pixels that are drawn for want of them, in 1/256.
+    pub(super) wanted: Vec<(PageId, u64)>,
+    pub(super) report: CutReport,
+    max_px: Vec4,
+    groups: u32,
+}
+
+/// What to do with a group.
+const DRAW_AND_DESCEND: u8 = 0;
+const DRAW: u8 = 1;
+const DESCEND: u8 = 2;
+
+impl Worker {
+    pub(super) fn new() -> Self {
+        let nothing = SplatBall { center_in_eye: [0.0; 3], radius: 0.0 };
+        Self {
+            stack: Vec::with_capacity(256),
+            balls: Box::new([nothing; BATCH]),
+            normal_colors: Box::new([0; BATCH]),
+            filled: 0,
+            pieces: Vec::new(),
+            wanted: Vec::new(),
+            report: CutReport::default(),
+            max_px: Vec4::ZERO,
+            groups: 0,
+        }
+    }
+
+    /// Bytes that it keeps.
+    pub(super) fn bytes(&self) -> u64 {
+        let fixed = size_of::<Self>() + BATCH * (size_of::<SplatBall>() + size_of::<u32>());
+        let grown = self.stack.capacity() * size_of::<Group>()
+            + self.pieces.capacity() * size_of::<(u32, u32, SplatPiece)>()
+            + self.wanted.capacity() * size_of::<(PageId, u64)>();
+        (fixed + grown) as u64
+    }
+
+    /// Prepares for a new cut.
+    pub(super) fn begin(&mut self) {
+        self.stack.clear();
+        self.filled = 0;
+        self.wanted.clear();
+        self.report = CutReport::default();
+        self.max_px = Vec4::ZERO;
+    }
+
+    /// Splits the work: replaces groups by themselves and what is below them, level by level, until there are enough.
+    pub(super) fn split(&mut self, cut: &Cut, enough: usize, items: &mut Vec<Item>, scratch: &mut Vec<Item>) {
+        while !items.is_empty() {
+            let whole = items.iter().filter(|item| item.whole).count();
+            if whole == 0 || whole >= enough || cut.is_over() {
+                break;
+            }
+            scratch.clear();
+            for item in items.drain(..) {
+                // What contradicts itself is found again when it is drawn.
+                if !item.whole || self.visit::<DESCEND>(cut, &item.group).is_err() {
+                    scratch.push(item);
+                    continue;
+                }
+                scratch.push(Item { whole: false, ..item });
+                scratch.extend(self.stack.drain(..).rev().map(|group| Item { group, whole: true }));
+            }
+            std::mem::swap(items, scratch);
+        }
+        self.begin();
+    }
+
+    /// Works until no chunk is left.
+    pub(super) fn run(&mut self, cut: &Cut) {
+        loop {
+            let chunk = cut.next_chunk.fetch_add(1, Relaxed);
+            if chunk >= cut.chunks || cut.is_over() {
+                break;
+            }
+            let begin = |chunk: u32| (u64::from(chunk) * cut.items.len() as u64 / u64::from(cut.chunks)) as usize;
+            for item in &cut.items[begin(chunk)..begin(chunk + 1)] {
+                if self.item(cut, chunk, item).is_err() {
+                    self.report.inconsistent = true;
+                    cut.stop.store(true, Relaxed);
+                }
+                if cut.is_over() {
+                    break;
+                }
+            }
+            self.flush(cut, chunk);
+        }
+        self.report.max_error_px = self.report.max_error_px.max(self.max_px.max_element());
+    }
+
+    fn item(&mut self, cut: &Cut, chunk: u32, item: &Item) -> Result<(), Inconsistent> {
+        if !item.whole {
+            self.visit::<DRAW>(cut, &item.group)?;
+            self.flush_if_full(cut, chunk);
+            return Ok(());
+        }
+        self.stack.clear();
+        self.stack.push(item.group);
+        while let Some(group) = self.stack.pop() {
+            self.visit::<DRAW_AND_DESCEND>(cut, &group)?;
+            self.flush_if_full(cut, chunk);
+            self.groups = self.groups.wrapping_add(1);
+            if self.groups % CHECK_GROUPS == 0 && cut.is_over() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn visit<const WHAT: u8>(&mut self, cut: &Cut, group: &Group) -> Result<(), Inconsistent> {
+        let stored = Stored::read(&cut.table, group)?;
+        self.report.visited += u64::from(group.count);
+        if self.report.visited > cut.max_nodes {
+            return Err(Inconsistent);
+        }
+        let decided = cut.look.decide(group.parent, group.known, &stored.words, group.count);
+        let inner = stored.inner();
+        let (mut open, mut missing) = (decided.coarse & inner, 0);
+        if open != 0 {
+            match stored.below(&cut.table, cut.frame)? {
+                Below::At(page, first) if WHAT != DRAW => {
+                    stored.push_open((page, first), group, &decided, open, &mut self.stack);
+                }
+                Below::At(..) => {}
+                Below::Missing(page) => {
+                    (missing, open) = (open, 0);
+                    if WHAT != DESCEND {
+                        self.want(page, keep(missing, decided.diameter_px));
+                    }
+                }
+            }
+        }
+        if WHAT == DESCEND {
+            return Ok(());
+        }
+        let unopened = decided.seen & !open;
+        let hidden = decided.hidden & unopened;
+        let drawn = unopened & !hidden;
+        self.report.culled_frustum += ones(decided.outside);
+        self.report.culled_backface += ones(decided.back | hidden);
+        if drawn & decided.coarse != 0 {
+            let limit = if drawn & missing != 0 { Limit::Residency } else { Limit::Data };
+            self.report.limited_by = self.report.limited_by.max(Some(limit));
+        }
+        self.max_px = self.max_px.max(keep(drawn, decided.diameter_px));
+
+        let balls = decided.balls_in_eye();
+        let colors = stored.colors(group, cut.tint);
+        let mut at = self.filled;
+        for lane in 0..4 {
+            // Overwritten by the next one where the lane is not drawn.
+            self.balls[at % BATCH] = bytemuck::cast(balls[lane].to_array());
+            self.normal_colors[at % BATCH] =
+                u32::from(Node(stored.words[lane]).normal()) | u32::from(colors[lane]) << 16;
+            at += (drawn >> lane & 1) as usize;
+        }
+        self.filled = at;
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn flush_if_full(&mut self, cut: &Cut, chunk: u32) {
+        if self.filled > BATCH - 4 {
+            self.flush(cut, chunk);
+        }
+    }
+
+    /// Appends what was collected to the list.
+    #[cold]
+    fn flush(&mut self, cut: &Cut, chunk: u32) {
+        let filled = std::mem::take(&mut self.filled);
+        self.report.drawn += filled as u64;
+        if cut.drawn.fetch_add(filled as u64, Relaxed) + filled as u64 > cut.most_splats {
+            cut.stop.store(true, Relaxed);
+            return;
+        }
+        let mut begin = 0;
+        while begin < filled {
+            let room = match self.pieces.last() {
+                Some((of, _, piece)) if *of == chunk => piece.room(),
+                _ => 0,
+            };
+            if room == 0 {
+                let Some(piece) = cut.empty_piece() else {
+                    return;
+                };
+                self.pieces.push((chunk, self.pieces.len() as u32, piece));
+                continue;
+            }
+            let end = filled.min(begin + room);
+            if let Some((_, _, piece)) = self.pieces.last_mut() {
+                piece.balls.extend_from_slice(&self.balls[begin..end]);
+                piece.normal_colors.extend_from_slice(&self.normal_colors[begin..end]);
+            }
+            begin = end;
+        }
+    }
+
+    /// Notes what could be drawn better with a page.
+    #[cold]
+    fn want(&mut self, page: PageId, diameters_px: Vec4) {
+        // Twice the threshold wanted is worth twice as much, but a node at the eye is not worth everything. Integers: their sum
+        // does not depend on its order.
+        let benefit = diameters_px.to_array().iter().map(|px| (px.min(MOST_BENEFIT_PX) * 256.0) as u64).sum();
+        match self.wanted.last_mut() {
+            Some((last, sum)) if *last == page => *sum += benefit,
+            _ => {
+                if self.wanted.len() == self.wanted.capacity() {
+                    sum_up(&mut self.wanted);
+                }
+                self.wanted.push((page, benefit));
+            }
+        }
+    }
+}
+
+/// Sorts by page and keeps one entry for each.
+pub(super) fn sum_up(wanted: &mut Vec<(PageId, u64)>) {
+    wanted.sort_unstable();
+    wanted.dedup_by(|next, first| {
+        let same = next.0 == first.0;
+        if same {
+            first.1 += next.1;
+        }
+        same
+    });
+}
+
+/// Number of lanes in a mask.
+#[inline(always)]
+pub(super) fn ones(mask: u32) -> u64 {
+    // A processor of the baseline has no instruction for it.
+    0x4332_3221_3221_2110 >> (mask * 4) & 0xF
+}
+
+impl Group {
+    /// The root alone.
+    pub(super) fn root(root: &Root, known: Known) -> Self {
+        Self {
+            parent: root.sphere.center.extend(root.sphere.radius),
+            page: PageId(0),
+            least_px: f32::INFINITY,
+            word: WordIndex(0),
+            level: 0,
+            count: 1,
+            known,
+        }
+    }
+}
+
+impl Item {
+    /// A whole hierarchy.
+    pub(super) fn root(root: &Root, known: Known) -> Self {
+        Self { group: Group::root(root, known), whole: true }
+    }
+}
