@@ -35,7 +35,7 @@ fn two_views_of_one_file_share_pages_and_nothing_else() {
         let (_, selection) = scene.draws(view).next().expect("one instance");
         selection.draw.clone()
     };
-    for (view, eye, threshold_px) in [(CAMERA, &near, &Fineness::px(1.0)), (LIGHT, &far, &Fineness::px(4.0))] {
+    for (view, eye, threshold_px) in [(CAMERA, &near, 1.0), (LIGHT, &far, 4.0)] {
         let mut alone = scene(statue(), 1 << 30);
         alone.select_converged(view, eye, &Fineness::px(threshold_px));
         assert!(drawn(&alone, view) == drawn(&both, view), "{view:?} sees what it would see alone");
@@ -95,9 +95,9 @@ fn a_selector_on_the_device_is_served_like_one_on_the_host() {
     let mut selection = Selection::default();
     for _ in 0..40 {
         let view = ModelView::new(&camera, &Similarity::IDENTITY);
-        let (residency, interrupt) = (&residency, &Interrupt::default());
+        let interrupt = &Interrupt::default();
         let (threshold_px, most_splats, room_bytes) = (2.0, u64::MAX, u64::MAX);
-        let input = SelectInput { file, view, threshold_px, most_splats, room_bytes, interrupt, residency };
+        let input = SelectInput { file, view, threshold_px, most_splats, room_bytes, interrupt, residency: &residency };
         selector.select(target, &input, &mut selection);
         assert_eq!(selection.draw, DrawSource::OnDevice(DeviceDraw { handle: 0 }));
         residency.serve(&selection.requests);

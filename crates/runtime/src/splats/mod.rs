@@ -22,11 +22,11 @@ use gigalod_geom::color::rgb565_of_srgb8;
 use gigalod_geom::projected;
 use gigalod_geom::quantise::normal;
 use lanes::Look;
-pub(crate) use sizes::{ThresholdSearch, coarser};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Mutex, PoisonError};
-use walk::{Cut, Item, MOST_BENEFIT_PX, sum_up};
+pub(crate) use sizes::{ThresholdSearch, coarser};
+use walk::{BENEFIT_UNITS, Cut, Item, MOST_BENEFIT_PX, sum_up};
 
 /// Where a splat's colour comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -238,7 +238,7 @@ impl SplatSelector {
         sum_up(&mut self.wanted);
         out.requests.extend(self.wanted.iter().map(|(page, benefit)| PageRequest {
             key: PageKey { file: input.file, page: *page },
-            benefit: *benefit as f32 / 256.0,
+            benefit: *benefit as f32 / BENEFIT_UNITS,
         }));
         if input.interrupt.is_set() {
             Outcome::Interrupted

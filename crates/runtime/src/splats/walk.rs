@@ -26,6 +26,9 @@ const BATCH: usize = 1024;
 /// What a page may be worth at most to one node.
 pub(super) const MOST_BENEFIT_PX: f32 = 1e6;
 
+/// Parts of a pixel in which benefits are summed.
+pub(super) const BENEFIT_UNITS: f32 = (1 << 20) as f32;
+
 /// Siblings still to be visited.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Group {
@@ -208,7 +211,7 @@ pub(super) struct Worker {
     filled: usize,
     /// Filled pieces, with chunk and number.
     pub(super) pieces: Vec<(u32, u32, SplatPiece)>,
-    /// Pages that are missing, and the pixels that are drawn for want of them, in 1/256.
+    /// Pages that are missing, and the pixels that are drawn for want of them, in [`BENEFIT_UNITS`].
     pub(super) wanted: Vec<(PageId, u64)>,
     pub(super) report: CutReport,
     max_px: Vec4,
@@ -256,15 +259,18 @@ impl Worker {
 
     /// Splits the work: replaces groups by themselves and what is below them, level by level, until there are enough.
     pub(super) fn split(&mut self, cut: &Cut, enough: usize, items: &mut Vec<Item>, scratch: &mut Vec<Item>) {
-        while !items.is_empty() {
+        self.begin();
+        let mut consistent = true;
+        loop {
             let whole = items.iter().filter(|item| item.whole).count();
-            if whole == 0 || whole >= enough || cut.is_over() {
+            if whole == 0 || whole >= enough || !consistent || cut.is_over() {
                 break;
             }
             scratch.clear();
             for item in items.drain(..) {
                 // What contradicts itself is found again when it is drawn.
-                if !item.whole || self.visit::<DESCEND>(cut, &item.group).is_err() {
+                consistent &= !item.whole || self.visit::<DESCEND>(cut, &item.group).is_ok();
+                if !item.whole || !consistent {
                     scratch.push(item);
                     continue;
                 }
@@ -412,9 +418,9 @@ impl Worker {
     fn want(&mut self, page: PageId, diameters_px: Vec4) {
         // Twice the threshold wanted is worth twice as much, but a node at the eye is not worth everything. Integers: their sum
         // does not depend on its order.
-        let benefit = diameters_px.to_array().iter().map(|px| (px.min(MOST_BENEFIT_PX) * 256.0) as u64).sum();
+        let benefit = diameters_px.to_array().iter().map(|px| (px.min(MOST_BENEFIT_PX) * BENEFIT_UNITS) as u64).sum::<u64>();
         match self.wanted.last_mut() {
-            Some((last, sum)) if *last == page => *sum += benefit,
+            Some((last, sum)) if *last == page => *sum = sum.saturating_add(benefit),
             _ => {
                 if self.wanted.len() == self.wanted.capacity() {
                     sum_up(&mut self.wanted);
@@ -431,7 +437,7 @@ pub(super) fn sum_up(wanted: &mut Vec<(PageId, u64)>) {
     wanted.dedup_by(|next, first| {
         let same = next.0 == first.0;
         if same {
-            first.1 += next.1;
+            first.1 = first.1.saturating_add(next.1);
         }
         same
     });
@@ -463,5 +469,79 @@ impl Item {
     /// A whole hierarchy.
     pub(super) fn root(root: &Root, known: Known) -> Self {
         Self { group: Group::root(root, known), whole: true }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residency::{InlineLoader, Residency};
+    use crate::splats::Cutting;
+    use crate::{ModelView, Similarity};
+    use gigalod_build::{NoProgress, Options, splats};
+    use gigalod_format::splats::SplatFile;
+    use gigalod_format::{Container, FileStore};
+    use gigalod_geom::camera::UpAxis;
+    use gigalod_geom::{Camera, ImageSize};
+    use gigalod_synth::{Order, StatueOptions, write_statue};
+
+    #[test]
+    fn what_is_interrupted_visits_few_more_nodes() {
+        let mut ply = Vec::new();
+        let options = StatueOptions { triangles: 20_000, seed: 3, colors: false, order: Order::Coherent };
+        write_statue(options, &mut ply, &mut |_, _| {}).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("statue.glod");
+        let stream = gigalod_import::open(Box::new(std::io::Cursor::new(ply))).unwrap();
+        splats::build(stream, &Options::default(), &NoProgress, &out).unwrap();
+        let store = Arc::new(FileStore::open(&out).unwrap());
+        let file = Arc::new(SplatFile::open(Container::open(store).unwrap()).unwrap());
+        let root = *file.skeleton().root();
+        let mut residency = Residency::new(1 << 30, Box::<InlineLoader>::default());
+        let id = residency.add(file.clone());
+        let key = |page| crate::PageKey { file: id, page: PageId(page) };
+        let all: Vec<_> = (0..file.skeleton().pages().len() as u32)
+            .map(|page| crate::PageRequest { key: key(page), benefit: 1.0 })
+            .collect();
+        residency.serve(&all);
+        while residency.is_loading() {
+            residency.receive(true);
+        }
+        let size = ImageSize { width: 300, height: 300 };
+        let camera = Camera::orbit(&root.bounds, UpAxis::Y, [0.0, 0.0], 1.0, 0.7, size);
+        let view = ModelView::new(&camera, &Similarity::IDENTITY);
+        let cutting = Cutting { frustum_culling: false, backface_culling: false };
+        let look = Look::new(&view, &root, cutting, 0.0);
+        let interrupt = Interrupt::default();
+        let (table, frame) = residency.table(id);
+        let cut = Cut {
+            look,
+            table,
+            frame,
+            max_nodes: root.nodes,
+            tint: Tint::Model,
+            most_splats: u64::MAX,
+            piece_splats: 1024,
+            interrupt: interrupt.clone(),
+            items: vec![Item::root(&root, look.known())],
+            chunks: 1,
+            next_chunk: AtomicU32::new(0),
+            drawn: AtomicU64::new(0),
+            stop: AtomicBool::new(false),
+            free: Mutex::new((Vec::new(), u64::MAX)),
+            no_room: AtomicBool::new(false),
+        };
+        let mut worker = Worker::new();
+        worker.item(&cut, 0, &cut.items[0]).unwrap();
+        assert_eq!(worker.report.visited, root.nodes, "everything");
+        // As if it were set after any number of groups.
+        interrupt.set();
+        for groups in [0, 1, 100, CHECK_GROUPS - 1, 12_345] {
+            worker.begin();
+            worker.groups = groups;
+            worker.item(&cut, 0, &cut.items[0]).unwrap();
+            let most = u64::from(CHECK_GROUPS) * 4;
+            assert!((1..=most).contains(&worker.report.visited), "{} nodes", worker.report.visited);
+        }
     }
 }
