@@ -15,6 +15,7 @@
 //! triangles at the vertices below it. The bytes of the file depend on the sets of vertices and triangles and on nothing else: not
 //! on their order in the input, not on memory, not on threads.
 
+mod below;
 mod checkpoint;
 mod chunk;
 mod contract;
