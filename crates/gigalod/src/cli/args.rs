@@ -3,6 +3,7 @@
 use super::parse;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gigalod_geom::ImageSize;
+use gigalod_render::Kernel;
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -166,6 +167,27 @@ pub(crate) enum KernelArg {
     Square,
     /// Each ball's silhouette
     Round,
+    /// Soft spots that blend: slower, least aliased
+    Gauss,
+    /// Squares foreshortened by the surface's slope; may leave holes
+    SquareEllipse,
+    /// Silhouettes foreshortened by the surface's slope; may leave holes
+    RoundEllipse,
+    /// Soft spots foreshortened by the surface's slope
+    GaussEllipse,
+}
+
+impl From<KernelArg> for Kernel {
+    fn from(kernel: KernelArg) -> Self {
+        match kernel {
+            KernelArg::Square => Self::Square,
+            KernelArg::Round => Self::Round,
+            KernelArg::Gauss => Self::Gauss,
+            KernelArg::SquareEllipse => Self::SquareEllipse,
+            KernelArg::RoundEllipse => Self::RoundEllipse,
+            KernelArg::GaussEllipse => Self::GaussEllipse,
+        }
+    }
 }
 
 /// Tell what a .glod file holds

@@ -1,6 +1,6 @@
 //! `gigalod render`.
 
-use super::args::{CameraArgs, KernelArg, RenderArgs};
+use super::args::{CameraArgs, RenderArgs};
 use super::cache;
 use super::error::{CliError, Outcome};
 use super::files;
@@ -9,7 +9,7 @@ use super::progress::Console;
 use gigalod_format::splats::SplatFile;
 use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
 use gigalod_geom::{Aabb, Camera, ImageSize};
-use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
+use gigalod_render::{Frame, Gpu, Lighting, Look, Picture, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::splats::Tint;
 use gigalod_runtime::{CutReport, Instance, Limit, Residency, Scene, Similarity, ViewId};
@@ -87,10 +87,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
         camera,
         threshold_px: if args.full { 0.0 } else { args.error.unwrap_or(1.0) },
         look: Look {
-            kernel: match args.kernel {
-                KernelArg::Square => Kernel::Square,
-                KernelArg::Round => Kernel::Round,
-            },
+            kernel: args.kernel.into(),
             lighting: Lighting { towards_light: args.light, background: args.background },
         },
         tint: if args.lod_colors { Tint::Level } else { Tint::Model },
