@@ -75,7 +75,9 @@ impl Staging {
             view.slice(..).copy_from_slice(now);
             drop(view);
             self.copies.push(Copy { from: self.used, to: to.clone(), to_offset, bytes: count });
-            (self.used, to_offset, bytes) = (self.used + count, to_offset + count, later);
+            // Ranges of mapped memory begin at multiples of 8.
+            self.used = (self.used + count).next_multiple_of(wgpu::MAP_ALIGNMENT);
+            (to_offset, bytes) = (to_offset + count, later);
         }
         Ok(())
     }
