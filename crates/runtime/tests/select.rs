@@ -168,7 +168,8 @@ fn threads_make_the_same_list_in_pieces() {
         let mut scene = scene(large(), 1 << 30);
         scene.splats_mut().set_threads(threads);
         scene.splats_mut().cutting.backface_culling = false;
-        for (azimuth, zoom, threshold_px) in [(0.0, 1.0, 0.0), (70.0, 0.8, 0.3), (200.0, 1.1, 0.0), (200.0, 40.0, 0.1)] {
+        for (azimuth, zoom, threshold_px) in [(0.0, 1.0, 0.0), (70.0, 0.8, 0.3), (200.0, 1.1, 0.0), (200.0, 40.0, 0.1)]
+        {
             let camera = common::camera(&scene, azimuth, zoom);
             scene.select_converged(VIEW, &camera, &Fineness::px(threshold_px));
             let report = scene.select(VIEW, &camera, &Fineness::px(threshold_px));

@@ -22,10 +22,10 @@ use gigalod_geom::color::rgb565_of_srgb8;
 use gigalod_geom::projected;
 use gigalod_geom::quantise::normal;
 use lanes::Look;
+pub(crate) use sizes::{ThresholdSearch, coarser};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Mutex, PoisonError};
-pub(crate) use sizes::{ThresholdSearch, coarser};
 use walk::{BENEFIT_UNITS, Cut, Item, MOST_BENEFIT_PX, sum_up};
 
 /// Where a splat's colour comes from.

@@ -23,7 +23,8 @@ pub(crate) fn statue_bytes() -> &'static [u8] {
 /// A closed statue as PLY.
 pub(crate) fn statue_ply(triangles: u64, colors: bool) -> Vec<u8> {
     let mut ply = Vec::new();
-    write_statue(StatueOptions { triangles, seed: 3, colors, order: Order::Coherent }, &mut ply, &mut |_, _| {}).unwrap();
+    write_statue(StatueOptions { triangles, seed: 3, colors, order: Order::Coherent }, &mut ply, &mut |_, _| {})
+        .unwrap();
     ply
 }
 
