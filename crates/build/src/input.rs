@@ -1,11 +1,12 @@
 //! Which file a build is of, as far as it can be told without reading all of it.
 
 use gigalod_format::checksum;
+use gigalod_import::utc;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
-use std::time::UNIX_EPOCH;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Tells one input from another, and from itself after a change.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +47,12 @@ impl InputIdentity {
         })
     }
 
+    fn modified_time(&self) -> SystemTime {
+        // What was read back from a journal may be any number.
+        let (seconds, nanoseconds) = (self.modified.0, self.modified.1.min(999_999_999));
+        UNIX_EPOCH.checked_add(Duration::new(seconds, nanoseconds)).unwrap_or(UNIX_EPOCH)
+    }
+
     /// The first thing by which two inputs differ, of this one and of the other.
     pub(crate) fn difference(&self, other: &Self) -> Option<(String, String)> {
         let facts = |input: &Self| {
@@ -53,7 +60,7 @@ impl InputIdentity {
                 input.path.clone(),
                 format!("{} bytes", input.bytes),
                 format!("checksums {:08x} and {:08x} of its ends", input.ends[0], input.ends[1]),
-                format!("modified {}.{:09} s after 1970", input.modified.0, input.modified.1),
+                format!("modified {}", utc(input.modified_time())),
             ]
         };
         facts(self).into_iter().zip(facts(other)).find(|(own, others)| own != others)

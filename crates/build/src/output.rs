@@ -30,6 +30,7 @@ impl Output {
     /// What the system says; and where `path` is a folder.
     pub fn create(path: &Path) -> io::Result<Self> {
         expect_no_folder(path)?;
+        let path = &behind_links(path);
         let mut builder = tempfile::Builder::new();
         let name = path.file_name().map(|name| format!(".{}.", name.to_string_lossy())).unwrap_or_default();
         builder.prefix(&name).suffix(".part");
@@ -73,6 +74,14 @@ impl Output {
         drop(names);
         Ok(())
     }
+}
+
+/// The file that a name stands for: a link is followed, so that its target is replaced and not the link.
+pub(crate) fn behind_links(path: &Path) -> PathBuf {
+    let is_link = std::fs::symlink_metadata(path).is_ok_and(|there| there.is_symlink());
+    // A link to nowhere is itself replaced.
+    let target = if is_link { path.canonicalize().ok() } else { None };
+    target.unwrap_or_else(|| path.to_owned())
 }
 
 /// A file cannot take the place of a folder.

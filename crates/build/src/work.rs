@@ -8,7 +8,7 @@
 
 use crate::BuildError;
 use crate::journal::{Extent, Header, Journal};
-use crate::output::{folder_of, sync_folder};
+use crate::output::{behind_links, folder_of, sync_folder};
 use crate::unfinished::{self, Active, SPOOL_SUFFIX, registry};
 use serde_json::Value;
 use std::fs::{File, TryLockError};
@@ -27,8 +27,9 @@ pub(crate) struct Work {
 
 /// Where builds of `output` that do not fit into memory keep what they have, from one run to the next.
 pub fn work_folder(output: &Path) -> PathBuf {
+    let output = behind_links(output);
     let name = output.file_name().unwrap_or_default().to_string_lossy();
-    folder_of(output).join(format!(".{name}.build"))
+    folder_of(&output).join(format!(".{name}.build"))
 }
 
 /// True where an interrupted build of `output` can be continued.

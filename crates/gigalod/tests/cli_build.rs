@@ -338,3 +338,21 @@ fn a_replaced_file_keeps_its_permissions_and_a_folders_name_is_refused_at_once()
     assert!(ran.stderr.contains("the name of a folder, expected that of a file"), "{ran:?}");
     assert_eq!(names_in(folder.path()), ["private.glod"]);
 }
+
+#[test]
+#[cfg(unix)]
+fn an_output_that_is_a_link_stays_one_and_its_target_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = tempfile::tempdir().unwrap();
+    let (link, target) = (folder.path().join("latest.glod"), other.path().join("v7.glod"));
+    std::fs::write(&target, "old").unwrap();
+    std::os::unix::fs::symlink(&target, &link).unwrap();
+    run!["build", statue().ply, "-o", link].done();
+    assert!(link.symlink_metadata().unwrap().is_symlink());
+    assert!(bytes(&target) == bytes(&statue().glod));
+    // With little memory the build works in a folder, beside the target.
+    std::fs::write(&target, "old").unwrap();
+    run!["build", statue().ply, "-o", link, "--memory", "64MiB"].done();
+    assert!(link.symlink_metadata().unwrap().is_symlink() && bytes(&target) == bytes(&statue().glod));
+    assert_eq!((names_in(folder.path()), names_in(other.path())), (vec!["latest.glod".into()], vec!["v7.glod".into()]));
+}

@@ -48,6 +48,38 @@ fn render_reports_exactly_the_keys_of_the_contract() {
 }
 
 #[test]
+fn bench_reports_exactly_the_keys_of_the_contract() {
+    if !can_draw() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("turn.json");
+    run!["synth", "path", "sudden-turn", "--around", statue().glod, "-o", path, "--seconds", "0.5"].done();
+    const FRAMES: &str =
+        "frames[{frame_ms max_error_px page_misses points select_ms t threshold_px triangles upload_bytes}]";
+    let ran = run!["bench", statue().glod, "--path", path, "--size", "64x36", "--json"].done();
+    let json = ran.json();
+    assert_eq!(
+        shape(&json),
+        format!("{{adapter {FRAMES} problems[] summary{{frame_ms_max frame_ms_median frame_ms_p95 paced rest}}}}")
+    );
+    assert_eq!(json["frames"].as_array().unwrap().len(), 16, "each pose once");
+    assert!(json["frames"].as_array().unwrap().iter().all(|frame| frame["threshold_px"] == 1.0));
+    let ran = run!["bench", statue().glod, "--path", path, "--size", "64x36", "--target-ms", "20", "--json"].done();
+    let json = ran.json();
+    assert_eq!(
+        shape(&json),
+        format!(
+            "{{adapter {FRAMES} problems[] summary{{frame_ms_max frame_ms_median frame_ms_p95 \
+             paced{{frame_ms_median frame_ms_p05 frame_ms_p95 frames}} \
+             rest{{frames seconds sign_changes threshold_px}}}}}}"
+        )
+    );
+    assert_eq!(json["summary"]["rest"]["threshold_px"], 1.0, "at rest all is drawn");
+    assert_eq!(json["summary"]["rest"]["sign_changes"], 0);
+}
+
+#[test]
 fn verify_and_compare_report_exactly_the_keys_of_the_contract() {
     let ran = run!["verify", statue().glod, "--json"].done();
     assert_eq!(shape(&ran.json()), "{measured nodes_checked ok problems[]}");
@@ -182,7 +214,9 @@ fn wrong_usage_ends_with_status_2_and_says_what_is_wrong() {
         assert_eq!(shape(&ran.json()), "{error{file what where}}", "{arguments:?}");
         let what = ran.json()["error"]["what"].as_str().unwrap().to_string();
         assert!(what.contains(mentioned), "{arguments:?}: {what:?} mentions {mentioned:?}");
+        let others: Vec<&str> = ran.stderr.lines().skip(1).collect();
         assert!(ran.stderr.starts_with("error: "), "{arguments:?}: {ran:?}");
+        assert!(others.iter().all(|line| line.starts_with("hint: ")), "{arguments:?}: {ran:?}");
         let plain = cli_support::gigalod(&arguments);
         assert_eq!((plain.status, &*plain.stdout), (2, ""), "{arguments:?}");
     }

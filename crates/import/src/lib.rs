@@ -18,7 +18,7 @@ mod watch;
 pub use batch::{Attributes, Batch, VertexBatch, read_all};
 pub use error::{ImportError, Item, Place, Position, Problem};
 pub use open::open;
-pub use watch::{AskStamp, Stamp, open_watched};
+pub use watch::{AskStamp, Stamp, open_watched, utc};
 
 use gigalod_geom::camera::UpAxis;
 use std::io::{Read, Seek};

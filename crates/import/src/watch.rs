@@ -5,7 +5,8 @@
 
 use crate::{Attributes, Batch, ByteSource, ImportError, ModelStream, error::Problem, open};
 use gigalod_geom::camera::UpAxis;
-use std::{fmt, io, time::SystemTime};
+use std::time::{Duration, SystemTime};
+use std::{fmt, io};
 
 /// What changes with a file's contents, and can be told without reading it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,9 +88,15 @@ impl ModelStream for Watched {
 
 impl fmt::Display for Stamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let since = self.modified.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        write!(f, "{} bytes written {}.{:09} s after 1970", self.bytes, since.as_secs(), since.subsec_nanos())
+        write!(f, "{} bytes written {}", self.bytes, utc(self.modified))
     }
+}
+
+/// A time as `2026-11-22T13:44:05.123456789Z`; one before 1970 or after the year 9999 as the nearest within.
+pub fn utc(time: SystemTime) -> impl fmt::Display {
+    const LAST: Duration = Duration::from_secs(253_402_300_799);
+    let since = time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    humantime::format_rfc3339_nanos(SystemTime::UNIX_EPOCH + since.min(LAST))
 }
 
 #[cfg(test)]
@@ -98,7 +105,6 @@ mod tests {
     use crate::read_all;
     use std::io::{Read, Seek, SeekFrom};
     use std::sync::{Arc, Mutex};
-    use std::time::Duration;
 
     /// A file that others write to: its bytes, and when they did.
     #[derive(Clone)]
@@ -175,8 +181,8 @@ mod tests {
         let bytes = file().0.lock().unwrap().0.len();
         let message = |after: usize| {
             format!(
-                "changed while it was read (expected {bytes} bytes written 0.000000000 s after 1970, \
-                 found {after} bytes written 0.000000001 s after 1970)"
+                "changed while it was read (expected {bytes} bytes written 1970-01-01T00:00:00.000000000Z, \
+                 found {after} bytes written 1970-01-01T00:00:00.000000001Z)"
             )
         };
         assert_eq!(changed(|bytes| bytes.truncate(bytes.len() / 2)), message(bytes / 2), "not: the file ends before");

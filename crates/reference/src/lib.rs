@@ -8,9 +8,9 @@
 //! [`metrics::compare`] for how far two pictures are apart, and [`distance::two_sided`] for how far two surfaces are.
 //!
 //! ```text
-//! Mesh ─▶ Bvh ─┬▶ Truth ─┬▶ shade ─▶ Picture ─▶ metrics
+//! Mesh ─▶ Bvh ─┬▶ Truth ─┬▶ shade ─▶ Picture ─▶ metrics, temporal (shimmer)
 //!              │         └▶ judge (holes, fat)
-//!              └▶ distance
+//!              └▶ distance, screen_error
 //! ```
 #![forbid(unsafe_code)]
 
@@ -22,9 +22,12 @@ pub mod judge;
 pub mod mesh;
 pub mod metrics;
 pub mod picture;
+pub mod poses;
 pub mod raytrace;
+pub mod screen_error;
 pub mod shade;
 pub mod ssim;
+pub mod temporal;
 pub mod triangle;
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! requests come back through a [`RequestRing`], frames later. Residency never asks who made a request.
 #![forbid(unsafe_code)]
 
+pub mod controller;
 pub mod fineness;
 pub mod report;
 pub mod residency;
@@ -18,6 +19,7 @@ pub mod selection;
 pub mod splats;
 pub mod view;
 
+pub use controller::FrameRate;
 pub use fineness::{Fineness, Interrupt};
 pub use report::{CutReport, Limit};
 pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};

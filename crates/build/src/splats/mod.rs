@@ -15,6 +15,7 @@
 //! triangles at the vertices below it. The bytes of the file depend on the sets of vertices and triangles and on nothing else: not
 //! on their order in the input, not on memory, not on threads.
 
+mod below;
 mod checkpoint;
 mod chunk;
 mod contract;
@@ -35,7 +36,7 @@ mod reorder;
 mod tree;
 
 use crate::journal::Header;
-use crate::output::{Output, expect_no_folder, folder_of};
+use crate::output::{Output, behind_links, expect_no_folder, folder_of};
 use crate::progress::{Phases, Progress, Report};
 use crate::spool::Place;
 use crate::work::Work;
@@ -63,6 +64,7 @@ pub fn build(
     out: &Path,
 ) -> Result<Report, BuildError> {
     expect_no_folder(out).map_err(BuildError::Output)?;
+    let out = &*behind_links(out);
     let phases = Phases::new(progress);
     let workers = rayon::ThreadPoolBuilder::new()
         .num_threads(plan::threads(options))

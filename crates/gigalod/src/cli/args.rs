@@ -3,6 +3,7 @@
 use super::parse;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gigalod_geom::ImageSize;
+use gigalod_render::Kernel;
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -26,6 +27,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     Build(BuildArgs),
     Render(Box<RenderArgs>),
+    Bench(Box<BenchArgs>),
     Info(InfoArgs),
     Verify(VerifyArgs),
     Compare(CompareArgs),
@@ -99,11 +101,23 @@ pub(crate) struct RenderArgs {
     /// Picture to write, a PNG; replaced if it exists
     #[arg(short, long, value_name = "OUT.png")]
     pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) draw: DrawArgs,
+    #[command(flatten)]
+    pub(crate) camera: CameraArgs,
+    /// Also write the distance along the view axis, in model units: one 32-bit channel Z
+    #[arg(long, value_name = "OUT.exr")]
+    pub(crate) depth: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) build: BuildOptions,
+}
+
+/// How models are drawn, whatever for.
+#[derive(Args, Debug)]
+pub(crate) struct DrawArgs {
     /// Width and height in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse::image_size, value_name = "WxH")]
     pub(crate) size: ImageSize,
-    #[command(flatten)]
-    pub(crate) camera: CameraArgs,
     /// Largest error on screen, in pixels [default: 1]
     #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "PX")]
     pub(crate) error: Option<f64>,
@@ -122,12 +136,37 @@ pub(crate) struct RenderArgs {
     /// Colour each level of detail differently
     #[arg(long)]
     pub(crate) lod_colors: bool,
-    /// Most memory for decoded pages
+    /// Most memory for the model: decoded pages, and lists of what is drawn
     #[arg(long, default_value = "1GiB", value_parser = parse::size, value_name = "SIZE")]
     pub(crate) cpu_budget: u64,
-    /// Also write the distance along the view axis, in model units: one 32-bit channel Z
-    #[arg(long, value_name = "OUT.exr")]
-    pub(crate) depth: Option<PathBuf>,
+    /// Most memory on the graphics device, the picture included; where it does not suffice the model is drawn coarser [default:
+    /// all there is]
+    #[arg(long, value_parser = parse::size, value_name = "SIZE")]
+    pub(crate) gpu_budget: Option<u64>,
+}
+
+/// Move along a camera path and measure every frame
+///
+/// Without --target-ms each pose of the path is drawn once, at the error that --error asks for. With it the path is played in real
+/// time: the error follows the time that frames take, and when the path has ended, the picture is refined until it is as fine
+/// as --error asks for.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  gigalod synth path walk --around statue.glod -o walk.json\n  \
+    gigalod bench statue.glod --path walk.json\n  gigalod bench statue.glod --path walk.json --target-ms 100 --json")]
+pub(crate) struct BenchArgs {
+    /// Model: .glod, or a raw one
+    pub(crate) file: PathBuf,
+    /// Camera path, as `gigalod synth path` makes them
+    #[arg(long, value_name = "PATH.json")]
+    pub(crate) path: PathBuf,
+    /// Milliseconds that a frame should take
+    #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "MS", conflicts_with = "full")]
+    pub(crate) target_ms: Option<f64>,
+    /// Field of view, in degrees [default: the path's]
+    #[arg(long, value_parser = parse::fov, allow_hyphen_values = true, value_name = "DEG")]
+    pub(crate) fov: Option<f64>,
+    #[command(flatten)]
+    pub(crate) draw: DrawArgs,
     #[command(flatten)]
     pub(crate) build: BuildOptions,
 }
@@ -166,6 +205,27 @@ pub(crate) enum KernelArg {
     Square,
     /// Each ball's silhouette
     Round,
+    /// Soft spots that blend: slower, least aliased
+    Gauss,
+    /// Squares foreshortened by the surface's slope; may leave holes
+    SquareEllipse,
+    /// Silhouettes foreshortened by the surface's slope; may leave holes
+    RoundEllipse,
+    /// Soft spots foreshortened by the surface's slope
+    GaussEllipse,
+}
+
+impl From<KernelArg> for Kernel {
+    fn from(kernel: KernelArg) -> Self {
+        match kernel {
+            KernelArg::Square => Self::Square,
+            KernelArg::Round => Self::Round,
+            KernelArg::Gauss => Self::Gauss,
+            KernelArg::SquareEllipse => Self::SquareEllipse,
+            KernelArg::RoundEllipse => Self::RoundEllipse,
+            KernelArg::GaussEllipse => Self::GaussEllipse,
+        }
+    }
 }
 
 /// Tell what a .glod file holds

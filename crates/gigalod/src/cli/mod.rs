@@ -1,6 +1,7 @@
 //! Parses the arguments, runs one command, and reports how it went.
 
 pub(crate) mod args;
+mod bench;
 mod build;
 mod cache;
 mod compare;
@@ -12,12 +13,14 @@ mod parse;
 mod path_file;
 mod progress;
 mod render;
+mod stage;
 mod synth;
 mod usage;
 mod verify;
 
 use args::{Cli, Command};
 use clap::Parser;
+use clap::error::ErrorKind;
 use error::{CliError, Outcome};
 use std::io::{self, Write};
 use std::path::Path;
@@ -29,16 +32,7 @@ pub(crate) fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            let failed = error.use_stderr();
-            if failed && json_asked_for {
-                // What is wrong stands in the first paragraph; hints and usage follow.
-                let text = error.to_string();
-                let what = text.split("\n\n").next().unwrap_or_default();
-                let _ = say(&format!("{}\n", CliError::new(what.trim_start_matches("error: ")).to_json()));
-            }
-            // Help and version go to standard output, what was wrong to standard error. A closed pipe is not our problem.
-            let _ = error.print();
-            return ExitCode::from(if failed { 2 } else { 0 });
+            return usage_error(&error, json_asked_for);
         }
     };
     // Where there are no signals to handle, files of an interrupted run stay behind; that is no reason not to run.
@@ -55,6 +49,7 @@ pub(crate) fn run() -> ExitCode {
     let outcome = match &cli.command {
         Command::Build(args) => build::run(args, &console),
         Command::Render(args) => render::run(args, &console),
+        Command::Bench(args) => bench::run(args, &console),
         Command::Info(args) => info::run(args, &console),
         Command::Verify(args) => verify::run(args, &console),
         Command::Compare(args) => compare::run(args, &console),
@@ -77,6 +72,29 @@ pub(crate) fn run() -> ExitCode {
             ExitCode::from(if error.is_usage { 2 } else { 1 })
         }
     }
+}
+
+/// What the parser of arguments has to say: help, the version, or one line that says what is wrong.
+fn usage_error(error: &clap::Error, json_asked_for: bool) -> ExitCode {
+    if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        // A closed pipe is not our problem.
+        let _ = error.print();
+        return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+    }
+    // What is wrong stands in the first paragraph; tips, usage and where to find help follow.
+    let text = error.to_string();
+    let mut paragraphs = text.split("\n\n");
+    let what = paragraphs.next().unwrap_or_default();
+    let mut wrong = CliError::usage(what.trim_start_matches("error: "));
+    for paragraph in paragraphs {
+        let hint = paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
+        wrong = wrong.hint(hint.trim_start_matches("tip: ").trim_start_matches("For more information, "));
+    }
+    if json_asked_for {
+        let _ = say(&format!("{}\n", wrong.to_json()));
+    }
+    let _ = writeln!(io::stderr(), "{wrong}");
+    ExitCode::from(2)
 }
 
 /// Writes to standard output. A reader that has read enough is no error.

@@ -1,22 +1,19 @@
 //! `gigalod render`.
 
-use super::args::{CameraArgs, KernelArg, RenderArgs};
+use super::args::{CameraArgs, RenderArgs};
 use super::cache;
 use super::error::{CliError, Outcome};
 use super::files;
 use super::path_file;
 use super::progress::Console;
-use gigalod_format::splats::SplatFile;
+use super::stage::{Drawn, Stage, Wait};
 use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
 use gigalod_geom::{Aabb, Camera, ImageSize};
-use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
-use gigalod_runtime::residency::ThreadedLoader;
+use gigalod_render::{Look, Picture, Renderer};
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Fineness, Instance, Limit, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{CutReport, Fineness, Limit};
 use serde::Serialize;
 use std::path::Path;
-use std::sync::Arc;
-use std::time::Instant;
 
 /// The JSON object of `render`.
 #[derive(Serialize)]
@@ -29,7 +26,7 @@ struct RenderReport {
     max_error_px: Option<f64>,
     converged: bool,
     limited_by: Option<&'static str>,
-    drawn: Drawn,
+    drawn: DrawnCounts,
     culled: Culled,
     bytes_read: u64,
     cpu_bytes: u64,
@@ -40,7 +37,7 @@ struct RenderReport {
 }
 
 #[derive(Serialize)]
-struct Drawn {
+struct DrawnCounts {
     nodes: u64,
     triangles: u64,
     points: u64,
@@ -63,13 +60,6 @@ pub(crate) struct Job<'a> {
     pub(crate) depth: Option<&'a Path>,
 }
 
-/// A model open for drawing.
-pub(crate) struct Stage {
-    scene: Scene,
-    renderer: Renderer,
-    up: UpAxis,
-}
-
 pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliError> {
     if args.depth.as_ref() == Some(&args.output) {
         return Err(CliError::usage("the picture and its depth in one file, expected two"));
@@ -81,19 +71,13 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
     }
     files::check_png_name(&args.output)?;
     let file = cache::container_of(&args.file, &args.build, console)?;
-    let mut stage = Stage::open(&file, args.cpu_budget)?;
-    let camera = camera(&args.camera, args.size, &stage.bounds(), stage.up)?;
+    let mut stage = Stage::open(&file, args.draw.budgets())?;
+    let camera = camera(&args.camera, args.draw.size, &stage.bounds(), stage.up())?;
     let job = Job {
         camera,
-        threshold_px: if args.full { 0.0 } else { args.error.unwrap_or(1.0) },
-        look: Look {
-            kernel: match args.kernel {
-                KernelArg::Square => Kernel::Square,
-                KernelArg::Round => Kernel::Round,
-            },
-            lighting: Lighting { towards_light: args.light, background: args.background },
-        },
-        tint: if args.lod_colors { Tint::Level } else { Tint::Model },
+        threshold_px: args.draw.threshold_px(),
+        look: args.draw.look(),
+        tint: args.draw.tint(),
         output: &args.output,
         depth: args.depth.as_deref(),
     };
@@ -101,63 +85,18 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
 }
 
 impl Stage {
-    /// Opens a `.glod` file and the graphics device.
-    pub(crate) fn open(file: &Path, cpu_budget: u64) -> Result<Self, CliError> {
-        let splats: SplatFile = files::open_splats(file)?;
-        let up = splats.skeleton().root().up;
-        let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get()).min(4);
-        let loader = ThreadedLoader::new(threads)
-            .map_err(|error| CliError::new(format!("could not start loading threads: {error}")))?;
-        let mut residency = Residency::new(cpu_budget, Box::new(loader));
-        let id = residency.add(Arc::new(splats));
-        let mut scene = Scene::new(residency);
-        scene.set_cpu_budget(cpu_budget);
-        scene.add(Instance { file: id, placement: Similarity::IDENTITY });
-        let renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
-        Ok(Self { scene, renderer, up })
-    }
-
-    /// Around the model.
-    pub(crate) fn bounds(&self) -> Aabb {
-        self.scene.bounds()
-    }
-
-    /// Which way is up.
-    pub(crate) fn up(&self) -> UpAxis {
-        self.up
-    }
-
     /// Draws one picture and writes it; `name` is what messages call the model.
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
-        const CAMERA: ViewId = ViewId(0);
         self.scene.splats_mut().tint = job.tint;
-        let threshold_px = job.threshold_px as f32;
-        self.scene.select_converged(CAMERA, &job.camera, &Fineness::px(threshold_px));
-        // Once more with everything there: the time that a warm cut takes.
-        let begun = Instant::now();
-        let report = self.scene.select(CAMERA, &job.camera, &Fineness::px(threshold_px));
-        let select_ms = begun.elapsed().as_secs_f64() * 1e3;
-        let draws =
-            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-        let frame = Frame { camera: job.camera, look: job.look, draws };
-        let picture = self.renderer.picture(&frame).map_err(graphics_error)?;
-        let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let wanted = Fineness::px(job.threshold_px as f32);
+        let Drawn { report, select_ms, frame_ms, what: picture } =
+            self.draw_until(&job.camera, job.look, &wanted, Wait::Converged, Renderer::picture, console)?;
 
         files::write_png(job.output, picture.size, &picture.rgba)?;
         if let Some(depth) = job.depth {
             write_depth(depth, &picture)?;
         }
-        let residency = self.scene.residency();
-        let mut problems: Vec<String> = residency
-            .damaged()
-            .map(|(_, why)| CliError::in_file(name, why).to_string().replacen("error: ", "", 1))
-            .collect();
-        if report.inconsistent {
-            problems.push(format!("{}: the tree contradicts itself, parts may be missing", name.display()));
-        }
-        for problem in &problems {
-            console.warn(&CliError::new(problem));
-        }
+        let problems = self.problems(name, &report, console);
         let json = self.report(job, &report, select_ms, frame_ms, problems);
         let text = format!(
             "{}: {} splats, {}, in {frame_ms:.0} ms on {}\n",
@@ -178,7 +117,8 @@ impl Stage {
         problems: Vec<String>,
     ) -> RenderReport {
         let residency = self.scene.residency();
-        let complete = !residency.is_full() && report.limited_by != Some(Limit::Budget) && problems.is_empty();
+        let complete =
+            !residency.is_full() && report.limited_by != Some(Limit::Budget) && residency.damaged().next().is_none();
         RenderReport {
             width: job.camera.size.width,
             height: job.camera.size.height,
@@ -187,7 +127,7 @@ impl Stage {
             max_error_px: report.max_error_px.is_finite().then_some(f64::from(report.max_error_px)),
             converged: complete,
             limited_by: report.limited_by.map(|limit| limit.name()),
-            drawn: Drawn { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
+            drawn: DrawnCounts { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
             culled: Culled { frustum: report.culled_frustum, backface: report.culled_backface },
             bytes_read: residency.bytes_read(),
             cpu_bytes: self.scene.cpu_bytes(),
@@ -231,16 +171,6 @@ fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, up: UpAxis) -> Resu
     }
     let [azimuth, elevation, zoom] = args.orbit.unwrap_or([0.0, 0.0, 1.0]);
     Ok(Camera::orbit(bounds, up, [azimuth, elevation], zoom, fov_rad(args.fov), size))
-}
-
-fn graphics_error(error: RenderError) -> CliError {
-    let error_line = CliError::new(&error);
-    match error {
-        RenderError::NoAdapter(_) => {
-            error_line.hint("install a Vulkan driver, as mesa-vulkan-drivers and libvulkan1 on Debian and Ubuntu")
-        }
-        _ => error_line,
-    }
 }
 
 fn write_depth(path: &Path, picture: &Picture) -> Result<(), CliError> {

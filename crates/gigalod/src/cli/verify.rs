@@ -42,8 +42,8 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
         && problems.count == 0
     {
         let mesh = read_mesh(original, &work)?;
-        work.begin("measure", 0);
-        let figures = verify::against(&tree, splats.skeleton().root().origin, &mesh);
+        work.begin("measure", verify::steps(&tree, &mesh));
+        let figures = verify::against(&tree, splats.skeleton().root().origin, &mesh, &|done| work.at(done));
         judge(&figures, &mesh, splats.skeleton().root().leaves, &mut problems);
         measured = Some(figures);
     }

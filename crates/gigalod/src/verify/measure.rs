@@ -15,6 +15,7 @@ use gigalod_reference::mesh::MeshError;
 use gigalod_reference::{Bvh, Mesh};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Distances in model units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,12 +45,19 @@ pub fn mesh_of(model: Batch) -> Result<Mesh, MeshError> {
 /// Points of a unit sphere at which leaves are measured.
 const DIRECTIONS: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
 
-/// Measures. `origin` is that of the file's local space, in model space.
-pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> Measured {
+/// What [`against`] has to look at: nodes, vertices and triangles, these twice.
+pub fn steps(tree: &SplatTree, mesh: &Mesh) -> u64 {
+    (tree.nodes.len() + mesh.positions().len() + 2 * mesh.triangles().len()) as u64
+}
+
+/// Measures. `origin` is that of the file's local space, in model space. `at` is told from time to time, by any thread, how many
+/// of the [`steps`] are done.
+pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh, at: &(dyn Fn(u64) + Sync)) -> Measured {
+    let steps = Steps { done: AtomicU64::new(0), at };
     let bvh = Bvh::build(mesh);
-    let enclosed = count_unenclosed_vertices(tree, origin, mesh);
-    let uncovered = count_uncovered_samples(tree, origin, mesh);
-    let hidden = count_hidden_fronts(tree, origin, mesh);
+    let enclosed = count_unenclosed_vertices(tree, origin, mesh, &steps);
+    let uncovered = count_uncovered_samples(tree, origin, mesh, &steps);
+    let hidden = count_hidden_fronts(tree, origin, mesh, &steps);
 
     let per_node: Vec<NodeDistances> = tree
         .nodes
@@ -61,6 +69,7 @@ pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> Measured {
             // A point of the ball is at most a radius farther away than its centre.
             let bound = distance(center) + radius;
             let stored = 2.0 * radius;
+            steps.step();
             // A node without a size stands for triangles without one, and lies on them.
             let ratio = if bound > 0.0 { bound / stored } else { 0.0 };
             let mut out = NodeDistances { ratio, ..Default::default() };
@@ -86,6 +95,22 @@ pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> Measured {
     }
 }
 
+/// Counts what is done, and tells now and then.
+struct Steps<'a> {
+    done: AtomicU64,
+    at: &'a (dyn Fn(u64) + Sync),
+}
+
+impl Steps<'_> {
+    fn step(&self) {
+        const OFTEN: u64 = 1 << 12;
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        if done.is_multiple_of(OFTEN) {
+            (self.at)(done);
+        }
+    }
+}
+
 #[derive(Clone, Copy, Default)]
 struct NodeDistances {
     ratio: f64,
@@ -94,7 +119,7 @@ struct NodeDistances {
 }
 
 /// Number of vertices whose true sphere no path of decoded spheres encloses.
-fn count_unenclosed_vertices(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
+fn count_unenclosed_vertices(tree: &SplatTree, origin: DVec3, mesh: &Mesh, steps: &Steps<'_>) -> u64 {
     let mut radii = vec![-1.0_f64; mesh.positions().len()];
     for triangle in mesh.triangles() {
         let radius = triangle_bounding_radius(triangle.map(|vertex| mesh.positions()[vertex as usize]));
@@ -104,14 +129,16 @@ fn count_unenclosed_vertices(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u6
         }
     }
     let missing = |(vertex, radius): (usize, &f64)| {
+        steps.step();
         *radius >= 0.0 && !has_enclosing_path(tree, mesh.positions()[vertex] - origin, *radius)
     };
     radii.par_iter().enumerate().filter(|(vertex, radius)| missing((*vertex, radius))).count() as u64
 }
 
 /// Number of triangles' corners whose normal no path of spheres and cones holds.
-fn count_hidden_fronts(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
+fn count_hidden_fronts(tree: &SplatTree, origin: DVec3, mesh: &Mesh, steps: &Steps<'_>) -> u64 {
     let is_hidden = |triangle: &[u32; 3]| {
+        steps.step();
         let corners = triangle.map(|vertex| mesh.positions()[vertex as usize]);
         // Triangles without an area have no front.
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
@@ -123,10 +150,11 @@ fn count_hidden_fronts(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
 }
 
 /// Number of surface samples (corners, middles of edges, barycentre of each triangle) outside all leaves.
-fn count_uncovered_samples(tree: &SplatTree, origin: DVec3, mesh: &Mesh) -> u64 {
+fn count_uncovered_samples(tree: &SplatTree, origin: DVec3, mesh: &Mesh, steps: &Steps<'_>) -> u64 {
     mesh.triangles()
         .par_iter()
         .map(|triangle| {
+            steps.step();
             let [a, b, c] = triangle.map(|vertex| mesh.positions()[vertex as usize] - origin);
             let samples = [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5, (a + b + c) / 3.0];
             // An edge's middle may lie on the very border of two spheres: leave rounding its due.

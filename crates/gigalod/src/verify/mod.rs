@@ -6,7 +6,7 @@
 pub mod measure;
 pub mod structure;
 
-pub use measure::{Measured, against, mesh_of};
+pub use measure::{Measured, against, mesh_of, steps};
 pub use structure::{SplatTree, check};
 
 /// Problems beyond this many are counted, not told.

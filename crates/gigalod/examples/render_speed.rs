@@ -1,0 +1,168 @@
+//! How many splats a CPU-second draws, through compute passes and through the pipeline, side by side in one run.
+//!
+//! `cargo run --release --example render_speed -- FILE.glod [--error PX] [--kernel NAME] [--size WxH] [--orbit AZ,EL,ZOOM]
+//! [--rounds N] [--extent PX]`
+//!
+//! Takes a built model; prints one JSON object on a line: for each way the points of a frame, CPU-seconds (user and system, of
+//! the whole process) of its median round, and points per CPU-second, with the upload of the list and, as the difference to
+//! frames of the same size without a splat, without what every frame costs.
+//!
+//! Ways: `compute`: as the renderer does. `quads`: the same with every splat through the pipeline (extent 0). `depth_test`: the
+//! pipeline with a depth test, as on devices without storage buffers. `upload`: the list sent, no splat drawn: all of them lie
+//! behind the eye.
+
+use anyhow::{Context, Result, bail};
+use gigalod::format::splats::SplatFile;
+use gigalod::format::{Container, FileStore};
+use gigalod::geom::{Camera, ImageSize};
+use gigalod::render::{Frame, Gpu, GpuLevel, Kernel, Look, Renderer};
+use gigalod::runtime::residency::InlineLoader;
+use gigalod::runtime::splats::SplatList;
+use gigalod::runtime::{DrawSource, Fineness, Instance, Residency, Scene, Similarity, ViewId};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::Arc;
+
+struct Options {
+    threshold_px: f32,
+    kernel: Kernel,
+    size: ImageSize,
+    orbit: [f64; 3],
+    rounds: usize,
+    extent: Option<u32>,
+}
+
+fn main() -> Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [file, rest @ ..] = &arguments[..] else { bail!("usage: render_speed FILE.glod [--error PX] …") };
+    let options = parse(rest)?;
+    let container = Container::open(Arc::new(FileStore::open(Path::new(file)).context(file.clone())?))?;
+    let splats = Arc::new(SplatFile::open(container)?);
+    let up = splats.skeleton().root().up;
+    let mut residency = Residency::new(8 << 30, Box::new(InlineLoader::default()));
+    let id = residency.add(splats);
+    let mut scene = Scene::new(residency);
+    scene.add(Instance { file: id, placement: Similarity::IDENTITY });
+    let [azimuth, elevation, zoom] = options.orbit;
+    let bounds = scene.bounds();
+    let camera = Camera::orbit(&bounds, up, [azimuth, elevation], zoom, 40f64.to_radians(), options.size);
+    scene.select_converged(ViewId(0), &camera, &Fineness::px(options.threshold_px));
+    let list = scene.draws(ViewId(0)).map(|(_, selection)| selection.draw.clone()).next().context("one model")?;
+    let DrawSource::Splats(splats) = &list else { bail!("a list of splats") };
+    let behind = DrawSource::Splats(behind_the_eye(splats, &camera));
+    let nothing = DrawSource::Splats(SplatList::default());
+    let frame = |source| Frame {
+        camera,
+        look: Look { kernel: options.kernel, ..Look::default() },
+        draws: vec![(Similarity::IDENTITY, source)],
+    };
+
+    let mut native = Renderer::new(Gpu::open()?)?;
+    if let Some(extent) = options.extent {
+        native.set_compute_extent(extent);
+    }
+    let mut quads = Renderer::new(Gpu::open()?)?;
+    quads.set_compute_extent(0);
+    let mut depth_test = Renderer::new(Gpu::open_at(GpuLevel::WebGl)?)?;
+    let mut ways: Vec<(&str, &mut Renderer, &DrawSource, Vec<f64>)> = Vec::new();
+    let (mut for_nothing, mut for_upload) = (Renderer::new(Gpu::open()?)?, Renderer::new(Gpu::open()?)?);
+    ways.push(("nothing", &mut for_nothing, &nothing, vec![]));
+    ways.push(("upload", &mut for_upload, &behind, vec![]));
+    ways.push(("compute", &mut native, &list, vec![]));
+    ways.push(("quads", &mut quads, &list, vec![]));
+    if !options.kernel.is_gauss() {
+        ways.push(("depth_test", &mut depth_test, &list, vec![]));
+    }
+    // The first frame compiles and makes buffers.
+    for round in 0..=options.rounds {
+        for (_, renderer, source, seconds) in &mut ways {
+            let begun = cpu_seconds()?;
+            renderer.draw(&frame(*source))?;
+            if round > 0 {
+                seconds.push(cpu_seconds()? - begun);
+            }
+        }
+    }
+    let points = splats.len() as f64;
+    let medians: Vec<(&str, f64)> = ways.iter_mut().map(|(name, _, _, seconds)| (*name, median(seconds))).collect();
+    let of = |wanted: &str| medians.iter().find(|(name, _)| *name == wanted).map_or(0.0, |(_, seconds)| *seconds);
+    let drop_in = of("nothing");
+    let ways: serde_json::Map<String, Value> = medians
+        .iter()
+        .map(|(name, seconds)| {
+            let per_second =
+                |seconds: f64| if seconds > 0.0 { Value::from((points / seconds).round()) } else { Value::Null };
+            let figures = json!({
+                "cpu_seconds": seconds,
+                "points_per_cpu_second": per_second(seconds - drop_in),
+                "points_per_cpu_second_without_upload": per_second(seconds - of("upload")),
+                "points_per_cpu_second_whole_frame": per_second(*seconds),
+            });
+            (name.to_string(), figures)
+        })
+        .collect();
+    let adapter = native.gpu().adapter();
+    let report = json!({
+        "file": file, "adapter": adapter, "wide_keys": native.gpu().has_wide_keys(), "points": points,
+        "threshold_px": options.threshold_px, "kernel": format!("{:?}", options.kernel), "ways": ways,
+    });
+    println!("{report}");
+    Ok(())
+}
+
+/// The same list on the other side of the eye.
+fn behind_the_eye(splats: &SplatList, camera: &Camera) -> SplatList {
+    let mut behind = splats.clone();
+    let forward = camera.forward.as_vec3();
+    for ball in behind.pieces.iter_mut().flat_map(|piece| &mut piece.balls) {
+        let center = glam::Vec3::from_array(ball.center_in_eye);
+        ball.center_in_eye = (center - forward * (2.0 * center.dot(forward))).to_array();
+    }
+    behind
+}
+
+fn median(seconds: &mut [f64]) -> f64 {
+    seconds.sort_by(f64::total_cmp);
+    seconds[seconds.len() / 2]
+}
+
+/// User and system time of this process.
+fn cpu_seconds() -> Result<f64> {
+    use nix::sys::resource::{UsageWho, getrusage};
+    use nix::sys::time::TimeValLike;
+    let usage = getrusage(UsageWho::RUSAGE_SELF)?;
+    Ok((usage.user_time().num_microseconds() + usage.system_time().num_microseconds()) as f64 * 1e-6)
+}
+
+fn parse(arguments: &[String]) -> Result<Options> {
+    let mut options = Options {
+        threshold_px: 1.0,
+        kernel: Kernel::Round,
+        size: ImageSize { width: 1280, height: 720 },
+        orbit: [0.0, 0.0, 1.0],
+        rounds: 7,
+        extent: None,
+    };
+    for pair in arguments.chunks(2) {
+        let [name, value] = pair else { bail!("{} without a value", pair[0]) };
+        match name.as_str() {
+            "--error" => options.threshold_px = value.parse()?,
+            "--rounds" => options.rounds = value.parse()?,
+            "--extent" => options.extent = Some(value.parse()?),
+            "--kernel" => {
+                let named = |kernel: &&Kernel| format!("{kernel:?}").eq_ignore_ascii_case(&value.replace('-', ""));
+                options.kernel = *Kernel::ALL.iter().find(named).context("no such kernel")?;
+            }
+            "--size" => {
+                let (width, height) = value.split_once('x').context("WxH")?;
+                options.size = ImageSize { width: width.parse()?, height: height.parse()? };
+            }
+            "--orbit" => {
+                let numbers = value.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+                options.orbit = numbers.try_into().ok().context("AZ,EL,ZOOM")?;
+            }
+            _ => bail!("unknown option {name}"),
+        }
+    }
+    Ok(options)
+}
