@@ -13,7 +13,8 @@ use std::collections::BTreeMap;
 pub(crate) struct Plain {
     pub(crate) report: CutReport,
     pub(crate) splats: Vec<(SplatBall, NormalColor)>,
-    pub(crate) wanted: BTreeMap<u32, f64>,
+    /// Pixels that are drawn for want of each page, and by how many nodes.
+    pub(crate) wanted: BTreeMap<u32, (f64, f64)>,
     /// Largest diameter of inner nodes that are drawn.
     pub(crate) coarsest_inner_px: f32,
     focal_px: f32,
@@ -33,7 +34,9 @@ impl CutSink for Plain {
     }
 
     fn miss(&mut self, page: gigalod_format::splats::PageId, error_px: f32) {
-        *self.wanted.entry(page.0).or_default() += f64::from(error_px.min(1e6));
+        let (sum, nodes) = self.wanted.entry(page.0).or_default();
+        *sum += f64::from(error_px.min(1e6));
+        *nodes += 1.0;
     }
 }
 
@@ -83,8 +86,9 @@ pub(crate) fn assert_same(scene: &Scene, view: ViewId, report: &CutReport, plain
     let (_, selection) = scene.draws(view).next().expect("one instance");
     let wanted: Vec<u32> = selection.requests.iter().map(|request| request.key.page.0).collect();
     assert_eq!(wanted, plain.wanted.keys().copied().collect::<Vec<_>>());
-    for (request, (page, benefit)) in selection.requests.iter().zip(&plain.wanted) {
-        let near = (f64::from(request.benefit) - benefit).abs() <= benefit * 1e-4 + 1e-5;
+    for (request, (page, (benefit, nodes))) in selection.requests.iter().zip(&plain.wanted) {
+        // Each node is rounded down, by a millionth of a pixel.
+        let near = (f64::from(request.benefit) - benefit).abs() <= benefit * 1e-4 + nodes * 1e-6;
         assert!(near, "page {page}: {} instead of {benefit}", request.benefit);
     }
 }
