@@ -110,7 +110,7 @@ impl ThresholdSearch {
         look.set_threshold_px(self.threshold_px);
         while let Some(group) = self.stack.pop() {
             groups = groups.wrapping_add(1);
-            if groups % CHECK_GROUPS == 0 && interrupt.is_set() {
+            if groups.is_multiple_of(CHECK_GROUPS) && interrupt.is_set() {
                 return false;
             }
             if group.least_px <= self.threshold_px {
