@@ -74,7 +74,9 @@ impl Crew {
     /// Makes a cut, with all workers or the first one alone; returns it, used up.
     pub(super) fn work(&self, cut: Cut, together: bool) -> Cut {
         for number in 0..self.len() {
-            self.worker(number).begin();
+            let mut worker = self.worker(number);
+            worker.begin();
+            worker.reserve(&cut);
         }
         *self.shared.cut.write().unwrap_or_else(PoisonError::into_inner) = Some(cut);
         if together && !self.threads.is_empty() {

@@ -9,8 +9,9 @@
 //! its own upwards. It need not finish at its own: as soon as too many are counted, its threshold is raised to where they are not,
 //! and what is below is not visited. So it visits a few times as many nodes as the cut will.
 
+use super::group::{Below, Group, Inconsistent, Stored, ones};
 use super::lanes::Look;
-use super::walk::{Below, CHECK_GROUPS, Group, Inconsistent, Stored, ones};
+use super::walk::CHECK_GROUPS;
 use crate::fineness::Interrupt;
 use crate::residency::PageTable;
 use gigalod_format::splats::Root;

@@ -6,13 +6,13 @@
 //! allocates nothing; it looks whether it shall stop every [`CHECK_GROUPS`] groups, that is after at most four times as many nodes.
 
 use super::Tint;
-use super::lanes::{Decided, Known, Look, keep};
+use super::group::{Below, Group, Inconsistent, Stored, ones};
+use super::lanes::{Known, Look, keep};
 use super::list::{SplatBall, SplatList, SplatPiece};
-use super::{level_color, packed_material};
 use crate::fineness::Interrupt;
 use crate::residency::PageTable;
 use crate::{CutReport, Limit};
-use gigalod_format::splats::{Node, Page, PageId, Root, WordIndex};
+use gigalod_format::splats::{Node, PageId, Root};
 use glam::Vec4;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -28,121 +28,6 @@ pub(super) const MOST_BENEFIT_PX: f32 = 1e6;
 
 /// Parts of a pixel in which benefits are summed.
 pub(super) const BENEFIT_UNITS: f32 = (1 << 20) as f32;
-
-/// Siblings still to be visited.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Group {
-    /// Decoded ball of the parent: x, y, z, radius; local space.
-    pub(super) parent: Vec4,
-    pub(super) page: PageId,
-    /// Smallest diameter of all that is above: with a threshold from there on, the group is not visited.
-    pub(super) least_px: f32,
-    pub(super) word: WordIndex,
-    pub(super) level: u16,
-    pub(super) count: u8,
-    pub(super) known: Known,
-}
-
-/// A group as it is stored.
-pub(super) struct Stored<'a> {
-    page: &'a Page,
-    pub(super) words: [u32; 4],
-    /// The word behind the group.
-    pointer: Option<u32>,
-}
-
-/// Where the children of a group's nodes begin, if their page is there.
-pub(super) enum Below {
-    /// First word of the first child group.
-    At(PageId, WordIndex),
-    /// The page is not resident.
-    Missing(PageId),
-}
-
-/// The tree contradicts itself.
-#[derive(Debug)]
-pub(super) struct Inconsistent;
-
-impl<'a> Stored<'a> {
-    /// Reads a group.
-    #[inline(always)]
-    pub(super) fn read(table: &'a PageTable, group: &Group) -> Result<Self, Inconsistent> {
-        let page = table.get(group.page).ok_or(Inconsistent)?;
-        let (start, count) = (usize::from(group.word.0), usize::from(group.count));
-        let rest = page.words().get(start..).ok_or(Inconsistent)?;
-        if let Some(words) = rest.first_chunk::<5>() {
-            let [a, b, c, d, _] = *words;
-            return Ok(Self { page, words: [a, b, c, d], pointer: words.get(count).copied() });
-        }
-        let mut words = [0; 4];
-        words.iter_mut().zip(rest).for_each(|(word, stored)| *word = *stored);
-        if rest.len() < count { Err(Inconsistent) } else { Ok(Self { page, words, pointer: rest.get(count).copied() }) }
-    }
-
-    /// Lanes of nodes that have children.
-    #[inline(always)]
-    pub(super) fn inner(&self) -> u32 {
-        self.words.iter().enumerate().map(|(lane, word)| u32::from(!Node(*word).is_leaf()) << lane).sum()
-    }
-
-    /// Where the children are; marks their page as used in `frame`.
-    #[inline(always)]
-    pub(super) fn below(&self, table: &PageTable, frame: u32) -> Result<Below, Inconsistent> {
-        let family = self.page.family(self.pointer.ok_or(Inconsistent)?);
-        match table.used(family.page, frame) {
-            Some(page) => Ok(Below::At(family.page, page.family_word(family.family).ok_or(Inconsistent)?)),
-            None => Ok(Below::Missing(family.page)),
-        }
-    }
-
-    /// Puts the groups below the nodes in `open` on the stack.
-    #[inline(always)]
-    pub(super) fn push_open(
-        &self,
-        (page, first): (PageId, WordIndex),
-        group: &Group,
-        decided: &Decided,
-        open: u32,
-        stack: &mut Vec<Group>,
-    ) {
-        let balls = decided.local_balls();
-        let diameters = decided.diameter_px.to_array();
-        // Backwards, so that the first is visited first.
-        let mut word =
-            first.0.saturating_add(self.words.iter().map(|word| Node(*word).children().words() as u16).sum());
-        for lane in (0..4).rev() {
-            let children = Node(self.words[lane]).children();
-            word = word.wrapping_sub(children.words() as u16);
-            if open >> lane & 1 != 0 {
-                stack.push(Group {
-                    parent: balls[lane],
-                    page,
-                    least_px: group.least_px.min(diameters[lane]),
-                    word: WordIndex(word),
-                    level: group.level.saturating_add(1),
-                    count: children.count,
-                    known: decided.known_below(lane as u32),
-                });
-            }
-        }
-    }
-
-    /// 5-6-5 colours of four nodes.
-    #[inline(always)]
-    fn colors(&self, group: &Group, tint: Tint) -> [u16; 4] {
-        if tint == Tint::Level {
-            return [level_color(u32::from(group.level)); 4];
-        }
-        let mut colors = [const { packed_material() }; 4];
-        if let Some(rest) = self.page.colors().get(usize::from(group.word.0)..) {
-            match rest.first_chunk::<4>() {
-                Some(four) => colors = *four,
-                None => colors.iter_mut().zip(rest).for_each(|(color, stored)| *color = *stored),
-            }
-        }
-        colors
-    }
-}
 
 /// A part of the work, in the order of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -173,6 +58,8 @@ pub(super) struct Cut {
     /// Empty pieces, and bytes that may be allocated for more.
     pub(super) free: Mutex<(Vec<SplatPiece>, u64)>,
     pub(super) no_room: AtomicBool,
+    /// Pages that were wanted last time.
+    pub(super) wanted_before: usize,
 }
 
 impl Cut {
@@ -248,6 +135,13 @@ impl Worker {
         (fixed + grown) as u64
     }
 
+    /// Has room for a whole cut like the last one, whichever part of this one it will do.
+    pub(super) fn reserve(&mut self, cut: &Cut) {
+        let free = cut.free.lock().unwrap_or_else(PoisonError::into_inner).0.len();
+        self.pieces.reserve(free);
+        self.wanted.reserve(cut.wanted_before * 2);
+    }
+
     /// Prepares for a new cut.
     pub(super) fn begin(&mut self) {
         self.stack.clear();
@@ -260,6 +154,9 @@ impl Worker {
     /// Splits the work: replaces groups by themselves and what is below them, level by level, until there are enough.
     pub(super) fn split(&mut self, cut: &Cut, enough: usize, items: &mut Vec<Item>, scratch: &mut Vec<Item>) {
         self.begin();
+        // The last round may make four of each, and has itself beside them.
+        items.reserve(enough * 6);
+        scratch.reserve(enough * 6);
         let mut consistent = true;
         loop {
             let whole = items.iter().filter(|item| item.whole).count();
@@ -444,28 +341,6 @@ pub(super) fn sum_up(wanted: &mut Vec<(PageId, u64)>) {
     });
 }
 
-/// Number of lanes in a mask.
-#[inline(always)]
-pub(super) fn ones(mask: u32) -> u64 {
-    // A processor of the baseline has no instruction for it.
-    0x4332_3221_3221_2110 >> (mask * 4) & 0xF
-}
-
-impl Group {
-    /// The root alone.
-    pub(super) fn root(root: &Root, known: Known) -> Self {
-        Self {
-            parent: root.sphere.center.extend(root.sphere.radius),
-            page: PageId(0),
-            least_px: f32::INFINITY,
-            word: WordIndex(0),
-            level: 0,
-            count: 1,
-            known,
-        }
-    }
-}
-
 impl Item {
     /// A whole hierarchy.
     pub(super) fn root(root: &Root, known: Known) -> Self {
@@ -531,6 +406,7 @@ mod tests {
             stop: AtomicBool::new(false),
             free: Mutex::new((Vec::new(), u64::MAX)),
             no_room: AtomicBool::new(false),
+            wanted_before: 0,
         };
         let mut worker = Worker::new();
         worker.item(&cut, 0, &cut.items[0]).unwrap();

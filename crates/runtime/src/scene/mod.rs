@@ -145,6 +145,7 @@ impl Scene {
     pub fn serve(&mut self) {
         self.residency.serve(&self.requests);
         self.requests.clear();
+        self.leave_the_rest_to_pages();
     }
 
     /// Selects, serves and waits until the view is as fine as was asked for, or cannot get finer. For pictures, not frames:
