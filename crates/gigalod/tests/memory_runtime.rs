@@ -34,7 +34,7 @@ fn a_flight_allocates_no_more_than_its_budget_and_its_lists() {
         splats::build(stream, &Options::default(), &NoProgress, &out).unwrap();
     }
     let file = Arc::new(SplatFile::open(Container::open(Arc::new(FileStore::open(&out).unwrap())).unwrap()).unwrap());
-    for budget in [MIB, 4 * MIB, 16 * MIB] {
+    for budget in [MIB, 4 * MIB, 12 * MIB] {
         for threads in [0, 3] {
             let ((fullest, drawn), peak) = peak_of(|| fly(&file, budget, threads));
             let [mib, pages, all] = [budget / MIB, fullest / 1024, peak as u64 / 1024];
