@@ -213,7 +213,7 @@ impl Worker {
             self.visit::<DRAW_AND_DESCEND>(cut, &group)?;
             self.flush_if_full(cut, chunk);
             self.groups = self.groups.wrapping_add(1);
-            if self.groups % CHECK_GROUPS == 0 && cut.is_over() {
+            if self.groups.is_multiple_of(CHECK_GROUPS) && cut.is_over() {
                 break;
             }
         }
