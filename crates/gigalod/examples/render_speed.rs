@@ -1,15 +1,14 @@
 //! How many splats a CPU-second draws, through compute passes and through the pipeline, side by side in one run.
 //!
 //! `cargo run --release --example render_speed -- FILE.glod [--error PX] [--kernel NAME] [--size WxH] [--orbit AZ,EL,ZOOM]
-//! [--rounds N] [--extent PX]`
+//! [--rounds N] [--extent PX] [--ways compute,quads,…]`
 //!
-//! Takes a built model; prints one JSON object on a line: for each way the points of a frame, CPU-seconds (user and system, of
-//! the whole process) of its median round, and points per CPU-second, with the upload of the list and, as the difference to
-//! frames of the same size without a splat, without what every frame costs.
+//! Takes a built model; prints one JSON object on a line: for each way CPU-seconds (user and system, of the whole process) of
+//! the median frame, sent and drawn, and drawn only (the list already lies on the device), and points per CPU-second of both,
+//! less what a frame of that size costs without a splat.
 //!
 //! Ways: `compute`: as the renderer does. `quads`: the same with every splat through the pipeline (extent 0). `depth_test`: the
-//! pipeline with a depth test, as on devices without storage buffers. `upload`: the list sent, no splat drawn: all of them lie
-//! behind the eye.
+//! pipeline with a depth test, as on devices without storage buffers. `nothing`: a frame without a splat.
 
 use anyhow::{Context, Result, bail};
 use gigalod::format::splats::SplatFile;
@@ -30,6 +29,7 @@ struct Options {
     orbit: [f64; 3],
     rounds: usize,
     extent: Option<u32>,
+    ways: Option<Vec<String>>,
 }
 
 fn main() -> Result<()> {
@@ -49,7 +49,6 @@ fn main() -> Result<()> {
     scene.select_converged(ViewId(0), &camera, &Fineness::px(options.threshold_px));
     let list = scene.draws(ViewId(0)).map(|(_, selection)| selection.draw.clone()).next().context("one model")?;
     let DrawSource::Splats(splats) = &list else { bail!("a list of splats") };
-    let behind = DrawSource::Splats(behind_the_eye(splats, &camera));
     let nothing = DrawSource::Splats(SplatList::default());
     let frame = |source| Frame {
         camera,
@@ -64,39 +63,45 @@ fn main() -> Result<()> {
     let mut quads = Renderer::new(Gpu::open()?)?;
     quads.set_compute_extent(0);
     let mut depth_test = Renderer::new(Gpu::open_at(GpuLevel::WebGl)?)?;
-    let mut ways: Vec<(&str, &mut Renderer, &DrawSource, Vec<f64>)> = Vec::new();
-    let (mut for_nothing, mut for_upload) = (Renderer::new(Gpu::open()?)?, Renderer::new(Gpu::open()?)?);
-    ways.push(("nothing", &mut for_nothing, &nothing, vec![]));
-    ways.push(("upload", &mut for_upload, &behind, vec![]));
-    ways.push(("compute", &mut native, &list, vec![]));
-    ways.push(("quads", &mut quads, &list, vec![]));
+    let mut for_nothing = Renderer::new(Gpu::open()?)?;
+    let way = |name, renderer, source| Way { name, renderer, source, sent: vec![], drawn: vec![] };
+    let mut ways = vec![
+        way("nothing", &mut for_nothing, &nothing),
+        way("compute", &mut native, &list),
+        way("quads", &mut quads, &list),
+    ];
     if !options.kernel.is_gauss() {
-        ways.push(("depth_test", &mut depth_test, &list, vec![]));
+        ways.push(way("depth_test", &mut depth_test, &list));
+    }
+    if let Some(wanted) = &options.ways {
+        ways.retain(|way| way.name == "nothing" || wanted.iter().any(|wanted| wanted == way.name));
     }
     // The first frame compiles and makes buffers.
     for round in 0..=options.rounds {
-        for (_, renderer, source, seconds) in &mut ways {
+        for way in &mut ways {
             let begun = cpu_seconds()?;
-            renderer.draw(&frame(*source))?;
+            way.renderer.draw(&frame(way.source))?;
+            let sent = cpu_seconds()?;
+            way.renderer.redraw()?;
             if round > 0 {
-                seconds.push(cpu_seconds()? - begun);
+                way.sent.push(sent - begun);
+                way.drawn.push(cpu_seconds()? - sent);
             }
         }
     }
     let points = splats.len() as f64;
-    let medians: Vec<(&str, f64)> = ways.iter_mut().map(|(name, _, _, seconds)| (*name, median(seconds))).collect();
-    let of = |wanted: &str| medians.iter().find(|(name, _)| *name == wanted).map_or(0.0, |(_, seconds)| *seconds);
-    let drop_in = of("nothing");
+    let medians: Vec<_> =
+        ways.iter_mut().map(|way| (way.name, median(&mut way.sent), median(&mut way.drawn))).collect();
+    let (_, empty_sent, empty_drawn) = medians[0];
+    let per_second = |seconds: f64| if seconds > 0.0 { Value::from((points / seconds).round()) } else { Value::Null };
     let ways: serde_json::Map<String, Value> = medians
         .iter()
-        .map(|(name, seconds)| {
-            let per_second =
-                |seconds: f64| if seconds > 0.0 { Value::from((points / seconds).round()) } else { Value::Null };
+        .map(|(name, sent, drawn)| {
             let figures = json!({
-                "cpu_seconds": seconds,
-                "points_per_cpu_second": per_second(seconds - drop_in),
-                "points_per_cpu_second_without_upload": per_second(seconds - of("upload")),
-                "points_per_cpu_second_whole_frame": per_second(*seconds),
+                "cpu_seconds": sent,
+                "cpu_seconds_without_upload": drawn,
+                "points_per_cpu_second": per_second(sent - empty_sent),
+                "points_per_cpu_second_without_upload": per_second(drawn - empty_drawn),
             });
             (name.to_string(), figures)
         })
@@ -110,15 +115,13 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The same list on the other side of the eye.
-fn behind_the_eye(splats: &SplatList, camera: &Camera) -> SplatList {
-    let mut behind = splats.clone();
-    let forward = camera.forward.as_vec3();
-    for ball in behind.pieces.iter_mut().flat_map(|piece| &mut piece.balls) {
-        let center = glam::Vec3::from_array(ball.center_in_eye);
-        ball.center_in_eye = (center - forward * (2.0 * center.dot(forward))).to_array();
-    }
-    behind
+/// A way of drawing, and CPU-seconds of its frames.
+struct Way<'a> {
+    name: &'static str,
+    renderer: &'a mut Renderer,
+    source: &'a DrawSource,
+    sent: Vec<f64>,
+    drawn: Vec<f64>,
 }
 
 fn median(seconds: &mut [f64]) -> f64 {
@@ -142,6 +145,7 @@ fn parse(arguments: &[String]) -> Result<Options> {
         orbit: [0.0, 0.0, 1.0],
         rounds: 7,
         extent: None,
+        ways: None,
     };
     for pair in arguments.chunks(2) {
         let [name, value] = pair else { bail!("{} without a value", pair[0]) };
@@ -149,6 +153,7 @@ fn parse(arguments: &[String]) -> Result<Options> {
             "--error" => options.threshold_px = value.parse()?,
             "--rounds" => options.rounds = value.parse()?,
             "--extent" => options.extent = Some(value.parse()?),
+            "--ways" => options.ways = Some(value.split(',').map(String::from).collect()),
             "--kernel" => {
                 let named = |kernel: &&Kernel| format!("{kernel:?}").eq_ignore_ascii_case(&value.replace('-', ""));
                 options.kernel = *Kernel::ALL.iter().find(named).context("no such kernel")?;

@@ -23,7 +23,7 @@ const BESIDES: u64 = MIB / 2;
 fn a_flight_allocates_no_more_than_its_budget() {
     let folder = tempfile::tempdir().unwrap();
     let file = statue(&folder.path().join("statue.glod"), 3_000_000);
-    for budget in [MIB, 4 * MIB, 16 * MIB] {
+    for budget in [MIB, 4 * MIB, 12 * MIB] {
         for threads in [0, 3] {
             for interruptible in [false, true] {
                 let (flight, peak) = peak_of(|| fly(&file, budget, threads, interruptible));

@@ -141,6 +141,11 @@ impl Gpu {
         self.device.features().contains(WIDE_KEYS)
     }
 
+    /// True where the host's processor does the drawing.
+    pub(crate) fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Longest edge of a picture, in pixels.
     pub fn max_picture_edge(&self) -> u32 {
         self.device.limits().max_texture_dimension_2d
@@ -158,10 +163,7 @@ impl Gpu {
     /// Bytes that a buffer may have, and that a pass can see of it.
     pub(crate) fn most_buffer_bytes(&self) -> u64 {
         let limits = self.device.limits();
-        let storage = limits.max_storage_buffer_binding_size;
-        // Vertex buffers, where there is no storage, are not bound by that.
-        let bound = if self.level == GpuLevel::WebGl { u64::MAX } else { storage };
-        limits.max_buffer_size.min(bound).min(1 << 30)
+        limits.max_buffer_size.min(limits.max_storage_buffer_binding_size.max(1 << 20)).min(1 << 30)
     }
 
     /// The first error since the last call, if there was one.

@@ -16,7 +16,7 @@ use crate::splats::store::{self, Chunk, Plan};
 use crate::staging::Staging;
 use crate::{Gpu, GpuLevel, Lighting, RenderError};
 use gigalod_geom::{Camera, ImageSize};
-use gigalod_runtime::{DrawSource, Similarity, SplatBall, SplatList};
+use gigalod_runtime::{DrawSource, Similarity, SplatList};
 
 /// How things are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,8 +62,17 @@ pub struct Renderer {
     compute_extent_px: u32,
     targets: Option<Targets>,
     staging: Staging,
-    buffers: Buffers,
     uploaded_bytes: u64,
+    buffers: Buffers,
+    last: Option<OnDevice>,
+}
+
+/// A frame that lies on the device, ready to be drawn.
+#[derive(Debug)]
+struct OnDevice {
+    kernel: Kernel,
+    bands: Bands,
+    plan: Plan,
 }
 
 /// What a picture of one size is drawn into.
@@ -105,8 +114,9 @@ impl Renderer {
             compute_extent_px: keyed::COMPUTE_EXTENT_PX,
             targets: None,
             staging,
-            buffers: Buffers::new(),
             uploaded_bytes: 0,
+            buffers: Buffers::new(),
+            last: None,
         })
     }
 
@@ -136,15 +146,21 @@ impl Renderer {
     pub fn most_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
         const NAMES: u64 = u32::MAX as u64 - 1;
         let Some(budget) = self.budget else { return NAMES };
-        // Sizes are rounded up, two buffers for each chunk: a page for each is more than enough.
-        let other = self.bytes_without_splats(size, kernel) + (64 << 10);
-        (budget.saturating_sub(other) / SplatList::SPLAT_BYTES).min(NAMES)
+        let room = budget.saturating_sub(self.bytes_without_splats(size, kernel));
+        // Whole rows of textures; of several chunks all but the last are full, and the list has room for one.
+        let listed = if self.gpu.level() > GpuLevel::WebGl { store::WIDTH * keyed::LISTED_BYTES } else { 0 };
+        let in_first = store::most_in_chunk(&self.gpu) / store::WIDTH;
+        let rows = match room / (store::ROW_BYTES + listed) {
+            rows if rows <= in_first => rows,
+            _ => (room - in_first * listed) / store::ROW_BYTES,
+        };
+        (rows * store::WIDTH).min(NAMES)
     }
 
     /// Splats of at most this many pixels across and down are drawn by the compute pass, larger ones through the pipeline: 0 for
-    /// none, `u32::MAX` for all. That decides how long a frame takes, never what it shows.
+    /// none, 60 is the most. That decides how long a frame takes, never what it shows.
     pub fn set_compute_extent(&mut self, extent_px: u32) {
-        self.compute_extent_px = extent_px;
+        self.compute_extent_px = extent_px.min(keyed::MOST_COMPUTE_EXTENT_PX);
     }
 
     /// Opens the device anew and forgets the old one: what to do about [`RenderError::DeviceLost`]. The next frame fills the new
@@ -167,6 +183,20 @@ impl Renderer {
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), RenderError> {
         self.submit(frame, false)?;
         self.survive(self.gpu.wait())
+    }
+
+    /// Draws the last frame once more from what lies on the device, without sending anything: for a window that was covered, or
+    /// a bench. False where there is no last frame, as after an error.
+    ///
+    /// # Errors
+    /// As for [`Renderer::draw`].
+    pub fn redraw(&mut self) -> Result<bool, RenderError> {
+        self.gpu.check()?;
+        if self.last.is_none() {
+            return Ok(false);
+        }
+        let drawn = self.submit_last().and_then(|()| self.gpu.wait());
+        self.survive(drawn).map(|()| true)
     }
 
     /// [`Renderer::draw`], and brings the picture to the host.
@@ -213,18 +243,20 @@ impl Renderer {
         if splats >= u64::from(u32::MAX) {
             return Err(RenderError::TooMany(splats));
         }
-        let drawn = self.try_submit(frame, &lists, read_back);
+        self.last = None;
+        let drawn = self.send(frame, &lists, read_back).and_then(|()| self.submit_last());
         self.survive(drawn)
     }
 
-    fn try_submit(
+    /// Makes room and uploads.
+    fn send(
         &mut self,
         frame: &Frame<'_>,
         lists: &[(Similarity, &SplatList)],
         read_back: bool,
     ) -> Result<(), RenderError> {
         let (camera, kernel) = (&frame.camera, frame.look.kernel);
-        let most = self.most_in_chunk();
+        let most = store::most_in_chunk(&self.gpu);
         let plan = Plan::new(camera, lists, most);
         let bands = self.bands(camera.size, kernel);
         let keyed = self.gpu.level() > GpuLevel::WebGl;
@@ -234,7 +266,7 @@ impl Renderer {
             depth_test::pass_bytes(camera)
         };
         self.make_room(camera.size, kernel, &plan, passes.len() as u64, read_back)?;
-        let Self { gpu, staging, buffers, targets, uploaded_bytes, .. } = self;
+        let Self { gpu, staging, buffers, uploaded_bytes, .. } = self;
         store::upload(gpu, staging, &buffers.chunks, most, lists)?;
         staging.write(gpu, buffers.passes.buffer(), 0, &passes)?;
         staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&plan.parts))?;
@@ -242,21 +274,27 @@ impl Renderer {
         staging.write(gpu, buffers.light.buffer(), 0, bytemuck::bytes_of(&light))?;
         staging.finish(gpu)?;
         *uploaded_bytes = staging.take_written_bytes();
+        self.last = Some(OnDevice { kernel, bands, plan });
+        Ok(())
+    }
 
+    /// Hands what lies on the device to the device.
+    fn submit_last(&mut self) -> Result<(), RenderError> {
+        let Self { gpu, buffers, targets, .. } = self;
+        let OnDevice { kernel, bands, plan } = self.last.as_ref().expect("just sent, or asked for");
         let Targets { gbuffer, picture } = targets.as_ref().expect("made with the room");
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let chunks = &buffers.chunks[..plan.chunks.len()];
+        let (kernel, passes, parts) = (*kernel, &buffers.passes, &buffers.parts);
         if chunks.is_empty() {
             drop(gbuffer.begin(&mut encoder, true));
-        } else if keyed {
-            self.keyed_pass.prepare(gpu, kernel);
-            let (passes, parts) = (&buffers.passes, &buffers.parts);
-            let keyed = KeyedFrame { kernel, bands, plan: &plan, chunks, passes, parts, buffers: &buffers.keyed };
+        } else if gpu.level() > GpuLevel::WebGl {
+            self.keyed_pass.prepare(gpu, kernel, plan);
+            let keyed = KeyedFrame { kernel, bands: *bands, plan, chunks, passes, parts, buffers: &buffers.keyed };
             self.keyed_pass.encode(gpu, &mut encoder, gbuffer, &keyed);
         } else {
             self.depth_test_pass.prepare(gpu, kernel);
-            let params = [&buffers.passes, &buffers.parts];
-            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, kernel, &plan, chunks, params);
+            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, kernel, plan, chunks, [passes, parts]);
         }
         let lit = self.light_pass.bind(&gpu.device, gbuffer, &buffers.light);
         {
@@ -279,20 +317,15 @@ impl Renderer {
         Bands::new(size, kernel, self.gpu.most_buffer_bytes().min(share))
     }
 
-    /// Splats in one buffer.
-    fn most_in_chunk(&self) -> u64 {
-        self.gpu.most_buffer_bytes() / size_of::<SplatBall>() as u64
-    }
-
     /// What a frame without a splat takes.
     fn bytes_without_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
         let mut buffers = Buffers::new();
         let bands = self.bands(size, kernel);
         if self.gpu.level() > GpuLevel::WebGl {
-            buffers.keyed.want(&bands, kernel);
+            buffers.keyed.want(&bands, kernel, 0);
         }
         buffers.want(size, STRIDE * USUAL_PARTS, USUAL_PARTS, true);
-        Staging::BYTES + targets_bytes(size) + buffers.all().map(|pool| memory::rounded(pool.wanted)).sum::<u64>()
+        Staging::BYTES + targets_bytes(size) + buffers.all().map(Pool::least_bytes).sum::<u64>()
     }
 
     /// Targets of this size, and buffers for a frame; within the budget, or with an error and nothing changed.
@@ -308,16 +341,15 @@ impl Renderer {
         let keyed = self.gpu.level() > GpuLevel::WebGl;
         let buffers = &mut self.buffers;
         buffers.all_mut().iter_mut().for_each(|pool| pool.wanted = 0);
-        let usage = if keyed { wgpu::BufferUsages::STORAGE } else { wgpu::BufferUsages::VERTEX };
         if buffers.chunks.len() < plan.chunks.len() {
-            buffers.chunks.resize_with(plan.chunks.len(), || Chunk::new(usage));
+            buffers.chunks.resize_with(plan.chunks.len(), Chunk::new);
         }
         for (chunk, (parts, splats)) in buffers.chunks.iter_mut().zip(&plan.chunks) {
             chunk.parts = parts.clone();
             chunk.want(*splats);
         }
         if keyed {
-            buffers.keyed.want(&bands, kernel);
+            buffers.keyed.want(&bands, kernel, plan.chunks.iter().map(|(_, splats)| *splats).max().unwrap_or(0));
         }
         buffers.want(size, pass_bytes, plan.parts.len() as u64, read_back);
         let other = Staging::BYTES + targets_bytes(size);
@@ -338,6 +370,9 @@ impl Renderer {
 
     /// After [`RenderError::OutOfMemory`] frees all that was kept, so that a coarser frame finds room.
     fn survive<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        if result.is_err() {
+            self.last = None;
+        }
         if let Err(RenderError::OutOfMemory(_)) = &result {
             self.buffers.all_mut().into_iter().for_each(Pool::free);
             self.buffers.chunks.clear();

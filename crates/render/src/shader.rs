@@ -2,7 +2,7 @@
 //! stands for one of several files: where a pass delivers what it draws.
 
 /// Sources that others import, by name.
-const SHARED: [(&str, &str); 9] = [
+const SHARED: [(&str, &str); 10] = [
     ("light_params.wgsl", include_str!("shader/light_params.wgsl")),
     ("splat_keys_32.wgsl", include_str!("shader/splat_keys_32.wgsl")),
     ("splat_keys_64.wgsl", include_str!("shader/splat_keys_64.wgsl")),
@@ -10,6 +10,7 @@ const SHARED: [(&str, &str); 9] = [
     ("splat_params.wgsl", include_str!("shader/splat_params.wgsl")),
     ("splat_parts.wgsl", include_str!("shader/splat_parts.wgsl")),
     ("splat_shape.wgsl", include_str!("shader/splat_shape.wgsl")),
+    ("splat_store.wgsl", include_str!("shader/splat_store.wgsl")),
     ("splat_sums.wgsl", include_str!("shader/splat_sums.wgsl")),
     ("splat_surface.wgsl", include_str!("shader/splat_surface.wgsl")),
 ];

@@ -27,14 +27,21 @@ struct Slot {
     mapping: Option<(Receiver<Result<(), wgpu::BufferAsyncError>>, wgpu::SubmissionIndex)>,
 }
 
-/// From the current slot.
+/// From the current slot, from `from` on.
 #[derive(Debug)]
 struct Copy {
     from: u64,
-    to: wgpu::Buffer,
-    to_offset: u64,
-    bytes: u64,
+    to: Goal,
 }
+
+#[derive(Debug)]
+enum Goal {
+    Buffer { buffer: wgpu::Buffer, offset: u64, bytes: u64 },
+    Texels { texture: wgpu::Texture, origin: wgpu::Origin3d, size: wgpu::Extent3d, row_bytes: u32 },
+}
+
+/// Where writes begin in a slot: texels have up to 16 bytes, and ranges of mapped memory begin at multiples of 8.
+const ALIGNMENT: u64 = 16;
 
 impl Staging {
     /// Bytes on the device.
@@ -53,7 +60,12 @@ impl Staging {
         Self { slots: (0..SLOTS).map(slot).collect(), current: 0, used: 0, copies: Vec::new(), written_bytes: 0 }
     }
 
-    /// Copies `bytes` to `to`, from `to_offset` on; both are multiples of 4.
+    /// Bytes written since the last call.
+    pub(crate) fn take_written_bytes(&mut self) -> u64 {
+        std::mem::take(&mut self.written_bytes)
+    }
+
+    /// Copies `bytes` to a buffer, from `to_offset` on; both are multiples of 4.
     ///
     /// # Errors
     /// What the device says.
@@ -64,29 +76,71 @@ impl Staging {
         mut to_offset: u64,
         mut bytes: &[u8],
     ) -> Result<(), RenderError> {
-        self.written_bytes += bytes.len() as u64;
         while !bytes.is_empty() {
-            if self.used == SLOT_BYTES {
-                self.finish(gpu)?;
-            }
-            self.slots[self.current].wait(gpu)?;
-            let count = (SLOT_BYTES - self.used).min(bytes.len() as u64);
+            let count = self.room(gpu, 1)?.min(bytes.len() as u64);
             let (now, later) = bytes.split_at(count as usize);
-            let mapped = self.slots[self.current].buffer.get_mapped_range_mut(self.used..self.used + count);
-            let mut view = mapped.map_err(|error| fault(gpu, &error))?;
-            view.slice(..).copy_from_slice(now);
-            drop(view);
-            self.copies.push(Copy { from: self.used, to: to.clone(), to_offset, bytes: count });
-            // Ranges of mapped memory begin at multiples of 8.
-            self.used = (self.used + count).next_multiple_of(wgpu::MAP_ALIGNMENT);
+            let to = Goal::Buffer { buffer: to.clone(), offset: to_offset, bytes: count };
+            self.put(gpu, now, to)?;
             (to_offset, bytes) = (to_offset + count, later);
         }
         Ok(())
     }
 
-    /// Bytes written since the last call.
-    pub(crate) fn take_written_bytes(&mut self) -> u64 {
-        std::mem::take(&mut self.written_bytes)
+    /// Copies `bytes` to a texture of rows, from texel number `first` on. Rows are multiples of what copies are aligned to.
+    ///
+    /// # Errors
+    /// What the device says.
+    pub(crate) fn write_texels(
+        &mut self,
+        gpu: &Gpu,
+        to: &wgpu::Texture,
+        mut first: u64,
+        mut bytes: &[u8],
+    ) -> Result<(), RenderError> {
+        let texel = u64::from(to.format().block_copy_size(None).expect("a format of plain texels"));
+        let width = u64::from(to.width());
+        while !bytes.is_empty() {
+            let room = self.room(gpu, texel)? / texel;
+            let (texels, column) = (bytes.len() as u64 / texel, first % width);
+            // Whole rows at once, or what there is of one.
+            let rows = if column == 0 { room.min(texels) / width } else { 0 };
+            let count = if rows > 0 { rows * width } else { room.min(texels).min(width - column) };
+            let (now, later) = bytes.split_at((count * texel) as usize);
+            let to = Goal::Texels {
+                texture: to.clone(),
+                origin: wgpu::Origin3d { x: column as u32, y: (first / width) as u32, z: 0 },
+                size: wgpu::Extent3d {
+                    width: count.min(width) as u32,
+                    height: rows.max(1) as u32,
+                    depth_or_array_layers: 1,
+                },
+                row_bytes: (width * texel) as u32,
+            };
+            self.put(gpu, now, to)?;
+            (first, bytes) = (first + count, later);
+        }
+        Ok(())
+    }
+
+    /// Bytes that can be put into the current slot, at least `least`.
+    fn room(&mut self, gpu: &Gpu, least: u64) -> Result<u64, RenderError> {
+        if SLOT_BYTES - self.used < least {
+            self.finish(gpu)?;
+        }
+        Ok(SLOT_BYTES - self.used)
+    }
+
+    fn put(&mut self, gpu: &Gpu, bytes: &[u8], to: Goal) -> Result<(), RenderError> {
+        self.written_bytes += bytes.len() as u64;
+        let (slot, end) = (&mut self.slots[self.current], self.used + bytes.len() as u64);
+        slot.wait(gpu)?;
+        let mapped = slot.buffer.get_mapped_range_mut(self.used..end);
+        let mut view = mapped.map_err(|error| fault(gpu, &error))?;
+        view.slice(..).copy_from_slice(bytes);
+        drop(view);
+        self.copies.push(Copy { from: self.used, to });
+        self.used = end.next_multiple_of(ALIGNMENT);
+        Ok(())
     }
 
     /// Submits what was written.
@@ -101,7 +155,24 @@ impl Staging {
         slot.buffer.unmap();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         for copy in self.copies.drain(..) {
-            encoder.copy_buffer_to_buffer(&slot.buffer, copy.from, &copy.to, copy.to_offset, copy.bytes);
+            match copy.to {
+                Goal::Buffer { buffer, offset, bytes } => {
+                    encoder.copy_buffer_to_buffer(&slot.buffer, copy.from, &buffer, offset, bytes);
+                }
+                Goal::Texels { texture, origin, size, row_bytes } => {
+                    let rows = (size.height > 1).then_some(size.height);
+                    let layout = wgpu::TexelCopyBufferLayout {
+                        offset: copy.from,
+                        bytes_per_row: rows.map(|_| row_bytes),
+                        rows_per_image: rows,
+                    };
+                    encoder.copy_buffer_to_texture(
+                        wgpu::TexelCopyBufferInfo { buffer: &slot.buffer, layout },
+                        wgpu::TexelCopyTextureInfo { origin, ..texture.as_image_copy() },
+                        size,
+                    );
+                }
+            }
         }
         let submitted = gpu.queue.submit([encoder.finish()]);
         let (sender, receiver) = channel();

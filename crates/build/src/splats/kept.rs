@@ -76,10 +76,11 @@ impl KeptTree {
         let mut next = 1;
         while let Some((first, count)) = stack.pop() {
             let from = stack.len();
-            for at in first..first + count {
-                let children = usize::from(self.nodes[at].children().count);
+            let group = first..first + count;
+            for (node, first_child) in self.nodes[group.clone()].iter().zip(&mut first_children[group]) {
+                let children = usize::from(node.children().count);
                 if children > 0 {
-                    first_children[at] = next as u32;
+                    *first_child = next as u32;
                     stack.push((next, children));
                     next += children;
                 }

@@ -118,12 +118,11 @@ impl Around {
     fn smallest(&self) -> (usize, f32) {
         let mut keys = [0.0_f32; PLACES];
         // Odd sizes have even centres. A little less than needed will do: whether it is enough is decided exactly, by the caller.
-        for (from, least) in [(0, 1.0), (8, 2.0)] {
-            for place in from..from + 8 {
-                let twos = rounded((self.needs[place] - least) * 0.5 + 0.4999);
-                // The distance decides among equals: its square is at most 12.
-                keys[place] = (if twos > 0.0 { twos } else { 0.0 } * 2.0 + least) * 16.0 + self.off[place];
-            }
+        for (place, (key, (need, off))) in keys.iter_mut().zip(self.needs.iter().zip(&self.off)).enumerate() {
+            let least = if place < PLACES / 2 { 1.0 } else { 2.0 };
+            let twos = rounded((need - least) * 0.5 + 0.4999);
+            // The distance decides among equals: its square is at most 12.
+            *key = (if twos > 0.0 { twos } else { 0.0 } * 2.0 + least) * 16.0 + off;
         }
         let mut best = (0, keys[0]);
         for (place, key) in keys.into_iter().enumerate().skip(1) {

@@ -1,7 +1,7 @@
 // splat_depth_test.wgsl: draws splats into the G-buffer by the depth test, for devices that cannot write storage (WebGL 2).
 //
 // Draw      one instance a splat of one part, 4 vertices each (a triangle strip).
-// Reads     frame, part; the instance's ball, normal and colour.
+// Reads     frame, part; balls, normals and colours.
 // Writes    as splat_resolve.wgsl.
 // Limits    none beyond WebGL 2. Cannot blend: no Gaussian kernels. Of splats that are equally near after rounding near / z the
 //           first wins: now and then another than elsewhere.
@@ -11,6 +11,7 @@
 @group(0) @binding(0) var<uniform> frame: PassParams;
 @group(0) @binding(1) var<uniform> part: PartParams;
 
+#import splat_store.wgsl
 #import splat_shape.wgsl
 #import splat_surface.wgsl
 
@@ -26,8 +27,10 @@ struct Corner {
 }
 
 @vertex
-fn place(@builtin(vertex_index) corner: u32, @location(0) ball: vec4f, @location(1) normal_color: u32) -> Corner {
-    let shape = shape_of(part, ball, normal_color & 0x3fffu);
+fn place(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance: u32) -> Corner {
+    let slot = part.first_slot + instance;
+    let normal_color = normal_color_at(slot);
+    let shape = shape_of(part, ball_at(slot), normal_color & 0x3fffu);
     let at = vec2f(vec2i(
         select(shape.window.x, shape.window.z, (corner & 1u) == 1u),
         select(shape.window.y, shape.window.w, (corner >> 1u) == 1u),

@@ -15,13 +15,13 @@ struct PassParams {
     phase: u32,
     // Splats whose window is wider or higher than this are drawn through the pipeline.
     compute_extent_px: u32,
-    // Places in the list of those.
-    list_capacity: u32,
     // Which of the parts lie in this buffer of splats.
     first_part: u32,
     part_count: u32,
     // 1: extents of splats are wanted too.
     wants_footprint: u32,
+    // Splats in this buffer.
+    chunk_count: u32,
     pad_a: u32,
     pad_b: u32,
     pad_c: u32,

@@ -8,11 +8,10 @@
 #import splat_params.wgsl
 
 @group(0) @binding(0) var<uniform> frame: PassParams;
-@group(0) @binding(1) var<storage, read> parts: array<PartParams>;
-@group(0) @binding(2) var<storage, read> balls: array<vec4f>;
-@group(0) @binding(3) var<storage, read> normal_colors: array<u32>;
 @group(0) @binding(6) var<storage, read> list: array<u32>;
+@group(0) @binding(8) var<storage, read> parts: array<PartParams>;
 
+#import splat_store.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_target.wgsl
@@ -34,7 +33,7 @@ struct Corner {
 fn place(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance: u32) -> Corner {
     let slot = list[instance];
     let part = parts[part_of_slot(slot)];
-    let splat = splat_of(part, balls[slot], normal_colors[slot], part.first_number + (slot - part.first_slot));
+    let splat = splat_of(part, ball_at(slot), normal_color_at(slot), part.first_number + (slot - part.first_slot));
     let shape = splat.shape;
     let at = vec2f(vec2i(
         select(shape.window.x, shape.window.z, (corner & 1u) == 1u),

@@ -9,12 +9,16 @@
 #import splat_params.wgsl
 
 @group(0) @binding(0) var<uniform> frame: PassParams;
-@group(0) @binding(1) var<storage, read> parts: array<PartParams>;
-@group(0) @binding(2) var<storage, read> balls: array<vec4f>;
-@group(0) @binding(3) var<storage, read> normal_colors: array<u32>;
+// The first part of the buffer; and all.
+@group(0) @binding(1) var<uniform> part: PartParams;
+@group(0) @binding(8) var<storage, read> parts: array<PartParams>;
 // Inverted number, nearness.
 @group(0) @binding(4) var<storage, read> keys: array<vec2u>;
 
+// True where there are several parts to tell apart: rare, and slow on some devices.
+override many_parts: bool = true;
+
+#import splat_store.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_parts.wgsl
@@ -25,23 +29,31 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     let pixel = vec2u(position.xy);
     let key = keys[(pixel.y - frame.first_row) * u32(frame.size_px.x) + pixel.x];
     let number = ~key.x;
-    let last = parts[frame.first_part + frame.part_count - 1u];
-    let first_number = parts[frame.first_part].first_number;
     // Of this buffer's splats, in which numbers and places run alike? A smaller number wraps around.
-    if key.y == 0u || number - first_number >= last.first_number - first_number + last.count {
+    let slot = number - part.first_number;
+    if key.y == 0u || slot >= frame.chunk_count {
         discard;
     }
-    let slot = parts[frame.first_part].first_slot + (number - first_number);
-    let part = parts[part_of_slot(slot)];
-    let normal_color = normal_colors[slot];
+    let normal_color = normal_color_at(slot);
+    let normal_code = normal_color & 0x3fffu;
+    var normal: vec3f;
     var footprint_px = 0.0;
-    if frame.wants_footprint == 1u {
-        footprint_px = footprint_of(shape_of(part, balls[slot], normal_color & 0x3fffu));
+    if many_parts {
+        let found = part_of_slot(slot);
+        normal = normal_in_world(parts[found], normal_code);
+        if frame.wants_footprint == 1u {
+            footprint_px = footprint_of(shape_of(parts[found], ball_at(slot), normal_code));
+        }
+    } else {
+        normal = normal_in_world(part, normal_code);
+        if frame.wants_footprint == 1u {
+            footprint_px = footprint_of(shape_of(part, ball_at(slot), normal_code));
+        }
     }
     let z = depth_of(key.y);
     var out: Surface;
     out.albedo = vec4f(color_of(normal_color >> 16u), 1.0);
-    out.normal_footprint = vec4f(normal_in_world(part, normal_color & 0x3fffu), footprint_px);
+    out.normal_footprint = vec4f(normal, footprint_px);
     out.depth_bits = bitcast<u32>(z);
     out.depth_test = frame.near / z;
     return out;

@@ -89,7 +89,8 @@ fn shape_of(part: PartParams, ball: vec4f, normal_code: u32) -> Shape {
     if c.z <= end {
         out.middle_px = frame.size_px * 0.5;
         out.half_px = frame.size_px.x + frame.size_px.y;
-        out.window = vec4i(band);
+        // Nothing of what lies wholly behind it.
+        out.window = select(vec4i(0), vec4i(band), c.z + end > 0.0);
         return out;
     }
     let to_px = frame.focal_px / ((c.z - end) * (c.z + end));
@@ -197,16 +198,30 @@ fn color_of(packed: u32) -> vec3f {
     return select(pow((encoded + 0.055) / 1.055, vec3f(2.4)), encoded / 12.92, encoded <= vec3f(0.04045));
 }
 
+// Tangent of -π/4 … π/4, to the last bits of a float (the polynomial of the Cephes library's `tanf`). Devices may be slow at the
+// general function.
+fn tangent(angle: vec2f) -> vec2f {
+    let t = angle * angle;
+    let high = ((9.38540185543e-3 * t + 3.11992232697e-3) * t + 2.44301354525e-2) * t + 5.34112807005e-2;
+    return angle + angle * t * ((high * t + 1.33387994085e-1) * t + 3.33331568548e-1);
+}
+
 // Unit vector of a 14-bit normal; CPU twin: `gigalod_geom::quantise::normal::decode`.
 fn normal_of(code: u32) -> vec3f {
-    let face = code / 2704u;
-    let slopes = tan(0.7853981634 * ((vec2f(f32(code % 52u), f32(code / 52u % 52u)) * 2.0 + 1.0) / 52.0 - 1.0));
-    let sign = select(1.0, -1.0, (face & 1u) == 1u);
-    switch face / 2u {
-        case 0u: { return normalize(vec3f(sign, slopes.x, slopes.y)); }
-        case 1u: { return normalize(vec3f(slopes.y, sign, slopes.x)); }
-        default: { return normalize(vec3f(slopes.x, slopes.y, sign)); }
-    }
+    // code / 52² and code / 52, exact for all codes: division of whole numbers is slow.
+    let face = (code * 24819u) >> 26u;
+    let row = (code * 10083u) >> 19u;
+    let cell = vec2f(vec2u(code - row * 52u, row - face * 52u));
+    let slopes = tangent(0.7853981634 * ((cell * 2.0 + 1.0) / 52.0 - 1.0));
+    let axis = face >> 1u;
+    let major = inverseSqrt(1.0 + dot(slopes, slopes));
+    let minor = slopes * major;
+    let signed = select(major, -major, (face & 1u) == 1u);
+    return select(
+        select(vec3f(minor, signed), vec3f(minor.y, signed, minor.x), axis == 1u),
+        vec3f(signed, minor),
+        axis == 0u,
+    );
 }
 
 // Normal of a splat, in world axes.

@@ -21,7 +21,8 @@ fn deliver(at: u32, meeting: Meeting, splat: Splat) {
         }
         return;
     }
-    if meeting.z > depth_of(nearest) + SAME_SURFACE * splat.shape.reach {
+    // Where there are only hems, all of them count: none is a surface that hides another.
+    if (nearest & 0x80000000u) != 0u && meeting.z > depth_of(nearest) + SAME_SURFACE * splat.shape.reach {
         return;
     }
     // A spline from 1 in the middle over 1/2 at the nominal radius to 0 at twice that.

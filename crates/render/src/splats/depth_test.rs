@@ -5,10 +5,9 @@ use crate::gbuffer::{self, GBuffer};
 use crate::memory::Pool;
 use crate::shader::{self, Target};
 use crate::splats::params::{PartParams, PassParams, STRIDE};
-use crate::splats::store::{Chunk, Plan};
+use crate::splats::store::{self, Chunk, Plan};
 use crate::splats::{DEPTH_TEST, Kernel};
 use gigalod_geom::Camera;
-use gigalod_runtime::SplatBall;
 use std::collections::BTreeMap;
 
 /// Draws splats by the depth test.
@@ -35,41 +34,29 @@ impl DepthTestPass {
         encoder: &mut wgpu::CommandEncoder,
         gbuffer: &GBuffer,
         kernel: Kernel,
-        plan: &Plan,
-        chunks: &[Chunk],
+        (plan, chunks): (&Plan, &[Chunk]),
         [passes, parts]: [&Pool; 2],
     ) {
         let (pipeline, layout) = &self.pipelines[&kernel];
-        let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("splats"),
-            layout,
-            entries: &[passes.entry_of::<PassParams>(0), parts.entry_of::<PartParams>(1)],
-        });
         let mut pass = gbuffer.begin(encoder, true);
         pass.set_pipeline(pipeline);
         for chunk in chunks {
+            let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("splats"),
+                layout,
+                entries: &[
+                    passes.entry_of::<PassParams>(0),
+                    parts.entry_of::<PartParams>(1),
+                    chunk.balls.entry(2),
+                    chunk.normal_colors.entry(3),
+                ],
+            });
             for index in chunk.parts.clone() {
-                let part = &plan.parts[index as usize];
-                let from = u64::from(part.first_slot);
                 pass.set_bind_group(0, &bound, &[index * STRIDE as u32]);
-                pass.set_vertex_buffer(0, chunk.balls.buffer().slice(from * size_of::<SplatBall>() as u64..));
-                pass.set_vertex_buffer(1, chunk.normal_colors.buffer().slice(from * 4..));
-                pass.draw(0..4, 0..part.count);
+                pass.draw(0..4, 0..plan.parts[index as usize].count);
             }
         }
     }
-}
-
-/// The columns of a list of splats, as the shader reads them.
-fn columns() -> [wgpu::VertexBufferLayout<'static>; 2] {
-    const BALL: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x4];
-    const NORMAL_COLOR: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![1 => Uint32];
-    let column = |stride: usize, attributes| wgpu::VertexBufferLayout {
-        array_stride: stride as u64,
-        step_mode: wgpu::VertexStepMode::Instance,
-        attributes,
-    };
-    [column(size_of::<SplatBall>(), &BALL), column(4, &NORMAL_COLOR)]
 }
 
 fn compile(gpu: &Gpu, kernel: Kernel) -> (wgpu::RenderPipeline, wgpu::BindGroupLayout) {
@@ -87,7 +74,12 @@ fn compile(gpu: &Gpu, kernel: Kernel) -> (wgpu::RenderPipeline, wgpu::BindGroupL
     };
     let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("splats"),
-        entries: &[uniform(0, false, size_of::<PassParams>()), uniform(1, true, size_of::<PartParams>())],
+        entries: &[
+            uniform(0, false, size_of::<PassParams>()),
+            uniform(1, true, size_of::<PartParams>()),
+            store::layout_entry(2, wgpu::ShaderStages::VERTEX),
+            store::layout_entry(3, wgpu::ShaderStages::VERTEX),
+        ],
     });
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("splats"),
@@ -103,7 +95,7 @@ fn compile(gpu: &Gpu, kernel: Kernel) -> (wgpu::RenderPipeline, wgpu::BindGroupL
             module: &module,
             entry_point: Some("place"),
             compilation_options: options.clone(),
-            buffers: &columns().map(Some),
+            buffers: &[],
         },
         primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
         depth_stencil: Some(gbuffer::depth_state(wgpu::CompareFunction::Greater, true)),
@@ -118,17 +110,4 @@ fn compile(gpu: &Gpu, kernel: Kernel) -> (wgpu::RenderPipeline, wgpu::BindGroupL
         cache: None,
     });
     (pipeline, layout)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_columns_of_a_list_are_vertex_buffers() {
-        assert_eq!(columns().map(|column| column.array_stride), [16, 4]);
-        // Centre, then radius: the four numbers of a ball.
-        let offsets = [std::mem::offset_of!(SplatBall, center_in_eye), std::mem::offset_of!(SplatBall, radius)];
-        assert_eq!((size_of::<SplatBall>(), offsets), (16, [0, 12]));
-    }
 }

@@ -12,7 +12,7 @@ use crate::gbuffer::{self, GBuffer};
 use crate::memory::Pool;
 use crate::shader::{self, Target};
 use crate::splats::params::{PartParams, PassParams, STRIDE};
-use crate::splats::store::{Chunk, Plan};
+use crate::splats::store::{self, Chunk, Plan};
 use crate::splats::{BLEND, COMPUTE, Kernel, QUADS, RESOLVE};
 use gigalod_geom::{Camera, ImageSize};
 use std::collections::BTreeMap;
@@ -21,16 +21,20 @@ use std::collections::BTreeMap;
 /// [`crate::Renderer::set_compute_extent`] says otherwise. Measured.
 pub(crate) const COMPUTE_EXTENT_PX: u32 = 16;
 
-/// Large splats that can be listed at a time.
-const LIST_CAPACITY: u32 = 1 << 18;
+/// Beyond this an invocation of the compute pass would take too many turns: the software adapter ends all loops of an invocation
+/// after 65,535 turns in all, and draws 16 splats in one.
+pub(crate) const MOST_COMPUTE_EXTENT_PX: u32 = 60;
 
 /// Bytes of a key, and of a pixel's sums.
 const KEY_BYTES: u64 = 8;
 const SUMS_BYTES: u64 = 40;
 
-/// `ROW` of splat_compute.wgsl in workgroups, and their size.
+/// Bytes of a large splat in the list.
+pub(crate) const LISTED_BYTES: u64 = 4;
+
+/// `ROW` of splat_compute.wgsl, and splats that a workgroup draws.
 const GROUPS_IN_ROW: u32 = 1 << 15;
-const GROUP: u32 = 64;
+const SPLATS_IN_GROUP: u32 = 64 * 16;
 
 /// How a frame is cut up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,9 +85,10 @@ impl KeyedBuffers {
     }
 
     /// Asks for room.
-    pub(crate) fn want(&mut self, bands: &Bands, kernel: Kernel) {
+    pub(crate) fn want(&mut self, bands: &Bands, kernel: Kernel, most_in_chunk: u64) {
         [self.keys.wanted, self.sums.wanted] = bands.bytes(kernel);
-        self.list.wanted = u64::from(LIST_CAPACITY) * 4;
+        // All of a chunk may be large.
+        self.list.wanted = most_in_chunk.max(1) * LISTED_BYTES;
         self.draw.wanted = 16;
     }
 }
@@ -100,7 +105,8 @@ struct Pipelines {
 /// Draws splats through keys.
 #[derive(Debug, Default)]
 pub(crate) struct KeyedPass {
-    pipelines: BTreeMap<Kernel, Pipelines>,
+    /// By kernel, and whether chunks have several parts.
+    pipelines: BTreeMap<(Kernel, bool), Pipelines>,
 }
 
 /// What a frame draws with.
@@ -141,15 +147,15 @@ pub(crate) fn pass_bytes(
     for band in 0..bands.count {
         let rows = bands.rows_of(band);
         for phase in 0..phases(gpu, kernel) {
-            for (parts, _) in &plan.chunks {
+            for (parts, splats) in &plan.chunks {
                 let params = PassParams {
                     first_row: rows.start,
                     end_row: rows.end,
                     phase,
                     compute_extent_px,
-                    list_capacity: LIST_CAPACITY,
                     first_part: parts.start,
                     part_count: parts.end - parts.start,
+                    chunk_count: *splats as u32,
                     wants_footprint: u32::from(wants_footprint),
                     ..PassParams::new(camera)
                 };
@@ -164,8 +170,9 @@ pub(crate) fn pass_bytes(
 
 impl KeyedPass {
     /// Compiles the passes of a kernel, once.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, kernel: Kernel) {
-        self.pipelines.entry(kernel).or_insert_with(|| Pipelines::new(gpu, kernel));
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, kernel: Kernel, plan: &Plan) {
+        let many_parts = plan.has_many_parts();
+        self.pipelines.entry((kernel, many_parts)).or_insert_with(|| Pipelines::new(gpu, kernel, many_parts));
     }
 
     /// Draws all splats of a frame into a G-buffer, which it clears. The kernel has been prepared, and there is a splat.
@@ -176,7 +183,7 @@ impl KeyedPass {
         gbuffer: &GBuffer,
         frame: &KeyedFrame<'_>,
     ) {
-        let pipelines = &self.pipelines[&frame.kernel];
+        let pipelines = &self.pipelines[&(frame.kernel, frame.plan.has_many_parts())];
         let bound: Vec<[wgpu::BindGroup; 3]> =
             frame.chunks.iter().map(|chunk| pipelines.bind(gpu, frame, chunk)).collect();
         let chunks = frame.chunks.len() as u32;
@@ -205,7 +212,7 @@ impl KeyedPass {
                     });
                     pass.set_pipeline(&pipelines.compute);
                     for part in parts {
-                        let groups = frame.plan.parts[part as usize].count.div_ceil(GROUP);
+                        let groups = frame.plan.parts[part as usize].count.div_ceil(SPLATS_IN_GROUP);
                         pass.set_bind_group(0, for_compute, &[pass_offset, offset(part)]);
                         pass.dispatch_workgroups(groups.min(GROUPS_IN_ROW), groups.div_ceil(GROUPS_IN_ROW), 1);
                     }
@@ -230,7 +237,9 @@ impl KeyedPass {
             // Sums are of all chunks.
             let resolved = if frame.kernel.is_gauss() { 1 } else { chunks };
             for chunk in 0..resolved {
-                pass.set_bind_group(0, &bound[chunk as usize][2], &[offset(pass_at(band, 0, chunk))]);
+                let offsets = [offset(pass_at(band, 0, chunk)), offset(frame.chunks[chunk as usize].parts.start)];
+                let offsets = if frame.kernel.is_gauss() { &offsets[..1] } else { &offsets[..] };
+                pass.set_bind_group(0, &bound[chunk as usize][2], offsets);
                 pass.draw(0..3, 0..1);
             }
         }
@@ -241,11 +250,22 @@ impl KeyedPass {
 const UNIFORMS: [(u32, u64); 2] = [(0, size_of::<PassParams>() as u64), (1, size_of::<PartParams>() as u64)];
 
 impl Pipelines {
-    fn new(gpu: &Gpu, kernel: Kernel) -> Self {
+    fn new(gpu: &Gpu, kernel: Kernel, many_parts: bool) -> Self {
         let device = &gpu.device;
         let target = target(gpu, kernel);
-        let constants = [("kernel", kernel.code())];
-        let options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
+        let set = |value: bool| f64::from(u8::from(value));
+        // A pass may be given only what it declares.
+        let of_kernel = ("kernel", kernel.code());
+        let mut drawing = vec![of_kernel];
+        if target == Target::Keys64 {
+            drawing.push(("reads_first", set(!gpu.is_software())));
+        }
+        let mut resolving = vec![of_kernel];
+        if !kernel.is_gauss() {
+            resolving.push(("many_parts", set(many_parts)));
+        }
+        let options =
+            |constants| wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: true };
         let gauss = kernel.is_gauss();
         let (both, vertex, fragment, compute) = (
             wgpu::ShaderStages::VERTEX_FRAGMENT,
@@ -261,36 +281,36 @@ impl Pipelines {
             }
             entries
         };
-        let layout = |label, uniforms: usize, stages, storage: &[(u32, wgpu::ShaderStages, bool)]| {
-            let uniforms = UNIFORMS[..uniforms].iter().map(|(binding, bytes)| {
-                let least = std::num::NonZeroU64::new(*bytes);
-                (*binding, stages, wgpu::BufferBindingType::Uniform, true, least)
-            });
+        let layout = |label, uniforms: usize, stages, textures: bool, storage: &[(u32, wgpu::ShaderStages, bool)]| {
+            let buffer = |binding, visibility, ty, has_dynamic_offset, bytes| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility,
+                ty: wgpu::BindingType::Buffer {
+                    ty,
+                    has_dynamic_offset,
+                    min_binding_size: std::num::NonZeroU64::new(bytes),
+                },
+                count: None,
+            };
+            let uniforms = UNIFORMS[..uniforms]
+                .iter()
+                .map(|(binding, bytes)| buffer(*binding, stages, wgpu::BufferBindingType::Uniform, true, *bytes));
             let storage = storage.iter().map(|(binding, stages, read_only)| {
-                (*binding, *stages, wgpu::BufferBindingType::Storage { read_only: *read_only }, false, None)
+                buffer(*binding, *stages, wgpu::BufferBindingType::Storage { read_only: *read_only }, false, 0)
             });
-            let entries: Vec<_> = uniforms
-                .chain(storage)
-                .map(|(binding, visibility, ty, has_dynamic_offset, min_binding_size)| wgpu::BindGroupLayoutEntry {
-                    binding,
-                    visibility,
-                    ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size },
-                    count: None,
-                })
-                .collect();
+            let textures = [2, 3].into_iter().filter(|_| textures);
+            let textures = textures.map(|binding| store::layout_entry(binding, stages));
+            let entries: Vec<_> = uniforms.chain(storage).chain(textures).collect();
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
         };
-        let for_compute = [read(2, compute), read(3, compute), write(4, compute), write(6, compute), write(7, compute)];
-        let for_quads = [read(1, both), read(2, vertex), read(3, vertex), write(4, fragment), read(6, vertex)];
-        let for_resolve: &[_] = if gauss {
-            &[read(4, fragment), read(5, fragment)]
-        } else {
-            &[read(1, fragment), read(2, fragment), read(3, fragment), read(4, fragment)]
-        };
+        let for_compute = [write(4, compute), write(6, compute), write(7, compute)];
+        let for_quads = [write(4, fragment), read(6, vertex), read(8, vertex)];
+        let for_resolve: &[_] =
+            if gauss { &[read(4, fragment), read(5, fragment)] } else { &[read(4, fragment), read(8, fragment)] };
         let layouts = [
-            layout("small splats", 2, compute, &with_sums(for_compute.to_vec(), write(5, compute))),
-            layout("large splats", 1, both, &with_sums(for_quads.to_vec(), write(5, fragment))),
-            layout("resolved splats", 1, fragment, for_resolve),
+            layout("small splats", 2, compute, true, &with_sums(for_compute.to_vec(), write(5, compute))),
+            layout("large splats", 1, both, true, &with_sums(for_quads.to_vec(), write(5, fragment))),
+            layout("resolved splats", if gauss { 1 } else { 2 }, fragment, !gauss, for_resolve),
         ];
         let [compute_layout, quads_layout, resolve_layout] = [0, 1, 2].map(|at: usize| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -305,7 +325,7 @@ impl Pipelines {
             layout: Some(&compute_layout),
             module: &module("splat_compute.wgsl", COMPUTE, target),
             entry_point: Some("draw_small"),
-            compilation_options: options.clone(),
+            compilation_options: options(&drawing),
             cache: None,
         });
         let quads_module = module("splat_quads.wgsl", QUADS, target);
@@ -315,7 +335,7 @@ impl Pipelines {
             vertex: wgpu::VertexState {
                 module: &quads_module,
                 entry_point: Some("place"),
-                compilation_options: options.clone(),
+                compilation_options: options(&drawing),
                 buffers: &[],
             },
             primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
@@ -324,7 +344,7 @@ impl Pipelines {
             fragment: Some(wgpu::FragmentState {
                 module: &quads_module,
                 entry_point: Some("cover"),
-                compilation_options: options.clone(),
+                compilation_options: options(&drawing),
                 targets: &[],
             }),
             multiview_mask: None,
@@ -341,7 +361,7 @@ impl Pipelines {
             vertex: wgpu::VertexState {
                 module: &resolve_module,
                 entry_point: Some("cover_picture"),
-                compilation_options: options.clone(),
+                compilation_options: options(&resolving),
                 buffers: &[],
             },
             primitive: Default::default(),
@@ -350,7 +370,7 @@ impl Pipelines {
             fragment: Some(wgpu::FragmentState {
                 module: &resolve_module,
                 entry_point: Some("resolve"),
-                compilation_options: options,
+                compilation_options: options(&resolving),
                 targets: &gbuffer::COLOR_TARGETS,
             }),
             multiview_mask: None,
@@ -372,14 +392,14 @@ impl Pipelines {
                 entries: &entries,
             })
         };
-        let (balls, normal_colors) = (chunk.balls.entry(2), chunk.normal_colors.entry(3));
         let (pass, part) = (passes.entry_of::<PassParams>(0), parts.entry_of::<PartParams>(1));
         let (keys, list, draw) = (buffers.keys.entry(4), buffers.list.entry(6), buffers.draw.entry(7));
-        let drawn = [pass.clone(), balls.clone(), normal_colors.clone(), keys.clone()];
-        let resolved = if gauss { vec![pass, keys] } else { [&drawn[..], &[parts.entry(1)]].concat() };
+        let drawn = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3), keys.clone()];
+        let all_parts = parts.entry(8);
+        let resolved = if gauss { vec![pass, keys] } else { [&drawn[..], &[part.clone(), all_parts.clone()]].concat() };
         [
             group(0, [&drawn[..], &[part, list.clone(), draw]].concat()),
-            group(1, [&drawn[..], &[parts.entry(1), list]].concat()),
+            group(1, [&drawn[..], &[all_parts, list]].concat()),
             group(2, resolved),
         ]
     }

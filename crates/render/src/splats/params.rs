@@ -29,13 +29,13 @@ pub(crate) struct PassParams {
     pub(crate) phase: u32,
     /// Splats whose window is wider or higher than this are drawn through the pipeline.
     pub(crate) compute_extent_px: u32,
-    /// Places in the list of those.
-    pub(crate) list_capacity: u32,
     /// Which of the parts lie in this buffer of splats.
     pub(crate) first_part: u32,
     pub(crate) part_count: u32,
     /// 1: extents of splats are wanted too.
     pub(crate) wants_footprint: u32,
+    /// Splats in this buffer.
+    pub(crate) chunk_count: u32,
     pub(crate) pad_a: u32,
     pub(crate) pad_b: u32,
     pub(crate) pad_c: u32,
@@ -75,10 +75,10 @@ impl PassParams {
             end_row: camera.size.height,
             phase: 0,
             compute_extent_px: 0,
-            list_capacity: 0,
             first_part: 0,
             part_count: 0,
             wants_footprint: 0,
+            chunk_count: 0,
             pad_a: 0,
             pad_b: 0,
             pad_c: 0,
@@ -132,10 +132,10 @@ mod tests {
                 end_row,
                 phase,
                 compute_extent_px,
-                list_capacity,
                 first_part,
                 part_count,
                 wants_footprint,
+                chunk_count,
                 pad_a,
                 pad_b,
                 pad_c

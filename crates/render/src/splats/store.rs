@@ -1,15 +1,31 @@
-//! Splats on the device: all lists of a frame one after the other, in as few buffers as the device's bindings allow.
+//! Splats on the device: all lists of a frame one after the other, in as few textures as their size allows.
 //!
-//! Takes the draws of a frame; leaves balls, normals and colours in buffers and says which part of which instance lies where.
-//! What always holds: numbers run through the frame in the order of the lists, and through each buffer in the order of places.
+//! Takes the draws of a frame; leaves balls, normals and colours in textures and says which part of which instance lies where.
+//! What always holds: numbers run through the frame in the order of the lists, and through each chunk in the order of places.
+//!
+//! They are textures and not buffers because every device reads a texture fast: the software adapter takes five times as long
+//! for four words of a buffer, one at a time.
 
 use crate::memory::Pool;
 use crate::splats::params::PartParams;
 use crate::staging::Staging;
 use crate::{Gpu, RenderError};
 use gigalod_geom::Camera;
+use gigalod_runtime::splats::NormalColor;
 use gigalod_runtime::{Similarity, SplatBall, SplatList};
 use std::ops::Range;
+
+/// Splats in a row of a chunk's textures; `STORE_WIDTH_LOG2` of splat_store.wgsl.
+pub(crate) const WIDTH: u64 = 4096;
+/// Bytes of a row of both textures.
+pub(crate) const ROW_BYTES: u64 = WIDTH * SplatList::SPLAT_BYTES;
+/// Rows of a chunk: as many as the least of devices allows, so that what many splats need is done on all.
+const MOST_ROWS: u32 = 2048;
+
+/// Splats that a chunk may have.
+pub(crate) fn most_in_chunk(gpu: &Gpu) -> u64 {
+    WIDTH * u64::from(gpu.max_picture_edge().min(MOST_ROWS))
+}
 
 /// Balls, normals and colours; and which parts lie here.
 #[derive(Debug)]
@@ -18,6 +34,8 @@ pub(crate) struct Chunk {
     pub(crate) normal_colors: Pool,
     /// Indices into [`Plan::parts`].
     pub(crate) parts: Range<u32>,
+    /// How many there are.
+    pub(crate) splats: u64,
 }
 
 /// Where the splats of a frame lie.
@@ -59,15 +77,44 @@ impl Plan {
     }
 }
 
+impl Plan {
+    /// True where a chunk holds parts of several instances.
+    pub(crate) fn has_many_parts(&self) -> bool {
+        self.chunks.iter().any(|(parts, _)| parts.len() > 1)
+    }
+}
+
 impl Chunk {
-    pub(crate) fn new(usage: wgpu::BufferUsages) -> Self {
-        Self { balls: Pool::new("balls", usage), normal_colors: Pool::new("normals and colours", usage), parts: 0..0 }
+    pub(crate) fn new() -> Self {
+        Self {
+            balls: Pool::rows("balls", wgpu::TextureFormat::Rgba32Float, WIDTH),
+            normal_colors: Pool::rows("normals and colours", wgpu::TextureFormat::R32Uint, WIDTH),
+            parts: 0..0,
+            splats: 0,
+        }
     }
 
     /// Asks for room for so many splats.
     pub(crate) fn want(&mut self, splats: u64) {
+        self.splats = splats;
         self.balls.wanted = splats * size_of::<SplatBall>() as u64;
-        self.normal_colors.wanted = splats * 4;
+        self.normal_colors.wanted = splats * size_of::<NormalColor>() as u64;
+    }
+}
+
+/// Binding 2, balls, or 3, normals and colours, of splat_store.wgsl.
+pub(crate) fn layout_entry(binding: u32, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
+    let sample_type =
+        if binding == 2 { wgpu::TextureSampleType::Float { filterable: false } } else { wgpu::TextureSampleType::Uint };
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility,
+        ty: wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+        count: None,
     }
 }
 
@@ -90,9 +137,9 @@ pub(crate) fn upload(
             let end = piece.balls.len().min(from + (most - slot) as usize);
             let chunk = &chunks[chunk];
             let balls = bytemuck::cast_slice(&piece.balls[from..end]);
-            staging.write(gpu, chunk.balls.buffer(), slot * size_of::<SplatBall>() as u64, balls)?;
+            staging.write_texels(gpu, chunk.balls.texture(), slot, balls)?;
             let normal_colors = bytemuck::cast_slice(&piece.normal_colors[from..end]);
-            staging.write(gpu, chunk.normal_colors.buffer(), slot * 4, normal_colors)?;
+            staging.write_texels(gpu, chunk.normal_colors.texture(), slot, normal_colors)?;
             number += (end - from) as u64;
             from = end;
         }

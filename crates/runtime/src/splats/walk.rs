@@ -315,8 +315,11 @@ impl Worker {
     fn want(&mut self, page: PageId, diameters_px: Vec4) {
         // Twice the threshold wanted is worth twice as much, but a node at the eye is not worth everything. Integers: their sum
         // does not depend on its order.
-        let benefit =
-            diameters_px.to_array().iter().map(|px| (px.min(MOST_BENEFIT_PX) * BENEFIT_UNITS) as u64).sum::<u64>();
+        let benefit = diameters_px
+            .to_array()
+            .iter()
+            .map(|px| (px.min(MOST_BENEFIT_PX) * BENEFIT_UNITS + 0.5) as u64)
+            .sum::<u64>();
         match self.wanted.last_mut() {
             Some((last, sum)) if *last == page => *sum = sum.saturating_add(benefit),
             _ => {
