@@ -294,7 +294,7 @@ impl Renderer {
             self.keyed_pass.encode(gpu, &mut encoder, gbuffer, &keyed);
         } else {
             self.depth_test_pass.prepare(gpu, kernel);
-            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, kernel, plan, chunks, [passes, parts]);
+            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, kernel, (plan, chunks), [passes, parts]);
         }
         let lit = self.light_pass.bind(&gpu.device, gbuffer, &buffers.light);
         {
