@@ -76,7 +76,10 @@ fn a_budget_is_kept_or_the_frame_refused() {
             Ok(()) => assert!(renderer.gpu_bytes() <= budget),
             other => panic!("{other:?}"),
         }
-        assert!(matches!(renderer.draw(&frame(&wall(most as usize + 1_000_000), kernel, size)), Err(RenderError::Budget { .. })));
+        assert!(matches!(
+            renderer.draw(&frame(&wall(most as usize + 1_000_000), kernel, size)),
+            Err(RenderError::Budget { .. })
+        ));
         assert!(same(&renderer.picture(&frame(&source, kernel, size)).unwrap(), &expected), "a refusal costs nothing");
         renderer.set_budget(Some(8 << 20));
         assert_eq!(renderer.most_splats(size, kernel), 0);

@@ -159,8 +159,10 @@ fn turned_instances_and_lists_of_many_buffers_hide_each_other() {
     );
     let draws: Vec<(Similarity, DrawSource)> = placements
         .map(|placement| {
-            let mut residency =
-                gigalod::runtime::Residency::new(1 << 30, Box::new(gigalod::runtime::residency::InlineLoader::default()));
+            let mut residency = gigalod::runtime::Residency::new(
+                1 << 30,
+                Box::new(gigalod::runtime::residency::InlineLoader::default()),
+            );
             let file = residency.add(file.clone());
             let mut scene = gigalod::runtime::Scene::new(residency);
             scene.add(gigalod::runtime::Instance { file, placement });
@@ -263,12 +265,10 @@ fn gaussians_flicker_least() {
     let start = Camera::orbit(&mesh.bounds(), UpAxis::Y, [20.0, 10.0], 1.0, 40f64.to_radians(), size);
     let distance = (mesh.bounds().center() - start.eye).length();
     let step = start.right * (0.1 * distance / start.focal_px());
-    let cameras: Vec<Camera> =
-        (0..9).map(|at| Camera { eye: start.eye + step * f64::from(at), ..start }).collect();
+    let cameras: Vec<Camera> = (0..9).map(|at| Camera { eye: start.eye + step * f64::from(at), ..start }).collect();
     let light = start.shoulder_light();
     let lighting = Lighting { towards_light: Some(light), ..Lighting::default() };
-    let shading =
-        Shading { to_light: light, background_srgb: lighting.background, plain_albedo_srgb: MATERIAL_SRGB };
+    let shading = Shading { to_light: light, background_srgb: lighting.background, plain_albedo_srgb: MATERIAL_SRGB };
     let green = |pixels: &[[u8; 3]]| pixels.iter().map(|pixel| f64::from(pixel[1])).collect::<Vec<_>>();
     let truth: Vec<Vec<f64>> =
         cameras.iter().map(|camera| green(&supersampled_picture(&bvh, camera, &shading, 4).pixels)).collect();

@@ -65,8 +65,7 @@ impl GBuffer {
 
     /// A pass that draws to it; `clear`: what was there is forgotten.
     pub(crate) fn begin<'a>(&self, encoder: &'a mut wgpu::CommandEncoder, clear: bool) -> wgpu::RenderPass<'a> {
-        let [albedo, normal, depth, depth_test] =
-            [&self.albedo, &self.normal, &self.depth, &self.depth_test].map(view);
+        let [albedo, normal, depth, depth_test] = [&self.albedo, &self.normal, &self.depth, &self.depth_test].map(view);
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("G-buffer"),
             color_attachments: &[

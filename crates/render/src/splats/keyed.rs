@@ -396,8 +396,7 @@ impl Pipelines {
         let (keys, list, draw) = (buffers.keys.entry(4), buffers.list.entry(6), buffers.draw.entry(7));
         let drawn = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3), keys.clone()];
         let all_parts = parts.entry(8);
-        let resolved =
-            if gauss { vec![pass, keys] } else { [&drawn[..], &[part.clone(), all_parts.clone()]].concat() };
+        let resolved = if gauss { vec![pass, keys] } else { [&drawn[..], &[part.clone(), all_parts.clone()]].concat() };
         [
             group(0, [&drawn[..], &[part, list.clone(), draw]].concat()),
             group(1, [&drawn[..], &[all_parts, list]].concat()),

@@ -26,9 +26,9 @@ const DEPTH_TEST: &str = include_str!("../shader/splat_depth_test.wgsl");
 /// All passes, by name, with where they deliver.
 #[cfg(test)]
 pub(crate) fn sources() -> impl Iterator<Item = (&'static str, &'static str, Target)> {
-    let delivering = [("compute", COMPUTE), ("quads", QUADS)].into_iter().flat_map(|(name, source)| {
-        [Target::Keys64, Target::Keys32, Target::Sums].map(|target| (name, source, target))
-    });
+    let delivering = [("compute", COMPUTE), ("quads", QUADS)]
+        .into_iter()
+        .flat_map(|(name, source)| [Target::Keys64, Target::Keys32, Target::Sums].map(|target| (name, source, target)));
     delivering
         .chain([("resolve", RESOLVE), ("blend", BLEND), ("depth test", DEPTH_TEST)].map(|(n, s)| (n, s, Target::None)))
 }

@@ -149,18 +149,7 @@ mod tests {
         shader::assert_same_layout!(
             PartParams,
             crate::splats::COMPUTE,
-            [
-                right,
-                up,
-                forward,
-                model_x,
-                model_y,
-                model_z,
-                first_number,
-                first_slot,
-                count,
-                world_from_model
-            ]
+            [right, up, forward, model_x, model_y, model_z, first_number, first_slot, count, world_from_model]
         );
         assert_eq!(size_of::<PartParams>() as u64, STRIDE);
     }

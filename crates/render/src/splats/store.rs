@@ -167,8 +167,7 @@ mod tests {
         let lists = [list(5), list(0), list(14), list(1)];
         let draws: Vec<_> = lists.iter().map(|list| (Similarity::IDENTITY, list)).collect();
         let plan = Plan::new(&camera, &draws, 8);
-        let parts: Vec<_> =
-            plan.parts.iter().map(|part| (part.first_number, part.first_slot, part.count)).collect();
+        let parts: Vec<_> = plan.parts.iter().map(|part| (part.first_number, part.first_slot, part.count)).collect();
         assert_eq!(parts, [(0, 0, 5), (5, 5, 3), (8, 0, 8), (16, 0, 3), (19, 3, 1)]);
         assert_eq!(plan.chunks, [(0..2, 8), (2..3, 8), (3..5, 4)]);
         assert!(Plan::new(&camera, &draws[1..2], 8).chunks.is_empty());
