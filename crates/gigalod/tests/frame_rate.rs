@@ -60,6 +60,7 @@ fn frames_take_their_time_along_paths_and_a_rested_picture_is_that_of_render() {
             let (ms, _, report) = frame(&mut scene, &mut control, &camera(&path, clock_ms * 1e-3), moved);
             clock_ms += ms;
             frames += 1;
+            println!("{frames} {ms:.1} {} {:.2} {:?}", report.drawn, report.threshold_px, report.limited_by);
             // The first frames know neither the machine nor the model.
             if frames > 8 {
                 late += u32::from(ms > 1.2 * TARGET_MS);
