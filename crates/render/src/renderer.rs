@@ -9,7 +9,7 @@ use crate::light::{LightParams, LightPass, PICTURE};
 use crate::memory::{self, Pool};
 use crate::readback::{self, read_texture};
 use crate::splats::Kernel;
-use crate::splats::depth_test::{self, DepthTestPass};
+use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
 use crate::splats::keyed::{self, Bands, KeyedBuffers, KeyedFrame, KeyedPass};
 use crate::splats::params::STRIDE;
 use crate::splats::store::{self, Chunk, Plan};
@@ -294,7 +294,8 @@ impl Renderer {
             self.keyed_pass.encode(gpu, &mut encoder, gbuffer, &keyed);
         } else {
             self.depth_test_pass.prepare(gpu, kernel);
-            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, kernel, (plan, chunks), [passes, parts]);
+            let splats = DepthTestFrame { kernel, plan, chunks, passes, parts };
+            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, &splats);
         }
         let lit = self.light_pass.bind(&gpu.device, gbuffer, &buffers.light);
         {

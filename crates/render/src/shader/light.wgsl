@@ -32,7 +32,7 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
         return params.background;
     }
     let from_middle = position.xy - params.size_px * 0.5;
-    let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) / params.focal_px;
+    let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) * (1.0 / params.focal_px);
     let stored = textureLoad(normal_texture, pixel, 0).xyz;
     let away = dot(stored, ray) > GRAZING * length(ray) * length(stored);
     // Where normals cancelled out, the surface faces the eye.
@@ -40,5 +40,5 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let normal = normalize(select(-ray, turned, dot(turned, turned) > 1e-8));
     let direct = (1.0 - params.ambient) * max(dot(normal, params.towards_light.xyz), 0.0);
     let lit = albedo.rgb * params.light.rgb * (params.ambient + direct);
-    return vec4f(mix(params.background.rgb, lit, albedo.a), 1.0);
+    return vec4f(params.background.rgb * (1.0 - albedo.a) + lit * albedo.a, 1.0);
 }

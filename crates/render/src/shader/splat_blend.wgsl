@@ -32,22 +32,23 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     if weight == 0.0 {
         discard;
     }
+    let per_weight = 1.0 / (weight * 4095.0);
     let albedo = vec3f(
         sum_at(first + 1u, (carries >> 8u) & 255u),
         sum_at(first + 2u, (carries >> 16u) & 255u),
         sum_at(first + 3u, carries >> 24u),
-    ) / (weight * 4095.0);
+    ) * per_weight;
     let normal = vec3f(
         sum_at(first + 4u, carries_normal & 1023u),
         sum_at(first + 5u, (carries_normal >> 10u) & 1023u),
         sum_at(first + 6u, carries_normal >> 20u),
-    ) / (weight * 4095.0) * 2.0 - 1.0;
+    ) * per_weight * 2.0 - 1.0;
     let is_surface = weight >= 128.0;
     let z = depth_of(keys[at].y);
     var out: Surface;
     out.albedo = vec4f(albedo, min(weight / 256.0, 1.0));
     out.normal_footprint = vec4f(normal, select(0.0, bitcast<f32>(sums[first + 9u]), is_surface));
     out.depth_bits = select(0x7f800000u, bitcast<u32>(z), is_surface);
-    out.depth_test = select(0.0, frame.near / z, is_surface);
+    out.depth_test = select(0.0, frame.near * (1.0 / z), is_surface);
     return out;
 }

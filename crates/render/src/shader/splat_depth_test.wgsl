@@ -65,6 +65,6 @@ fn cover(in: Corner) -> Surface {
     out.albedo = vec4f(in.albedo, 1.0);
     out.normal_footprint = in.normal_footprint;
     out.depth_bits = bitcast<u32>(meeting.z);
-    out.depth_test = frame.near / meeting.z;
+    out.depth_test = frame.near * (1.0 / meeting.z);
     return out;
 }

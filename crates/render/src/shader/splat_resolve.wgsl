@@ -55,6 +55,6 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     out.albedo = vec4f(color_of(normal_color >> 16u), 1.0);
     out.normal_footprint = vec4f(normal, footprint_px);
     out.depth_bits = bitcast<u32>(z);
-    out.depth_test = frame.near / z;
+    out.depth_test = frame.near * (1.0 / z);
     return out;
 }

@@ -9,6 +9,8 @@
 // Elliptical kernels (the splats paper, section 3.3) are the same shapes pressed together along the projected normal, to
 // |n·v| of their width, at least a tenth and at least one pixel. What is asked of a pixel is asked of where it lay before.
 //
+// Quotients are products with the inverse everywhere: some compilers make them so and others not, and the pictures shall be the same.
+//
 // The depth is that of the ball's front. A ball that covers a surface point is therefore never drawn behind it.
 
 // 0 square, 1 round, 2 Gaussian; 3 more: elliptical. Host twin: `Kernel`.
@@ -93,7 +95,7 @@ fn shape_of(part: PartParams, ball: vec4f, normal_code: u32) -> Shape {
         out.window = select(vec4i(0), vec4i(band), c.z + end > 0.0);
         return out;
     }
-    let to_px = frame.focal_px / ((c.z - end) * (c.z + end));
+    let to_px = frame.focal_px * (1.0 / ((c.z - end) * (c.z + end)));
     out.middle_px = frame.size_px * 0.5 + vec2f(c.x, -c.y) * (to_px * c.z);
     out.half_px = to_px * end * sqrt(max(dot(c, c) - end * end, 0.0)) + slack_px;
     var extent = vec2f(out.half_px);
@@ -101,7 +103,7 @@ fn shape_of(part: PartParams, ball: vec4f, normal_code: u32) -> Shape {
         let n = normal_of(normal_code);
         let facing = abs(dot(n, ball.xyz)) * inverseSqrt(max(dot(ball.xyz, ball.xyz), 1e-30));
         let nominal_px = select(out.half_px, out.half_px * 0.5, is_gauss());
-        let ratio = min(max(max(facing, LEAST_RATIO), 0.5 / nominal_px), 1.0);
+        let ratio = min(max(max(facing, LEAST_RATIO), 0.5 * (1.0 / nominal_px)), 1.0);
         // How the projection moves along the normal.
         let n_view = in_view(part, n);
         let along = vec2f(n_view.x * c.z - c.x * n_view.z, c.y * n_view.z - n_view.y * c.z);
@@ -137,7 +139,7 @@ fn apart_squared(shape: Shape, position_px: vec2f) -> f32 {
     let slope = slope_at(position_px);
     let aside = slope * shape.center.z - shape.center.xy;
     let along = dot(aside, slope);
-    return dot(aside, aside) - along * along / (1.0 + dot(slope, slope));
+    return dot(aside, aside) - along * along * (1.0 / (1.0 + dot(slope, slope)));
 }
 
 // A pixel of the splat's window.
@@ -165,7 +167,7 @@ fn meet(shape: Shape, pixel: vec2i) -> Meeting {
             shape_apart = apart_squared(shape, shape.middle_px + before);
         }
     }
-    out.off_squared = shape_apart / (shape.reach * shape.reach);
+    out.off_squared = shape_apart * (1.0 / (shape.reach * shape.reach));
     if is_gauss() {
         out.covered = out.off_squared < 4.0;
     } else if !is_square() {
@@ -187,15 +189,18 @@ fn footprint_of(shape: Shape) -> f32 {
     if c.z <= end {
         return most;
     }
-    let half_px = frame.focal_px * end * sqrt(max(dot(c, c) - end * end, 0.0)) / ((c.z - end) * (c.z + end));
+    let per_gap = 1.0 / ((c.z - end) * (c.z + end));
+    let half_px = frame.focal_px * end * sqrt(max(dot(c, c) - end * end, 0.0)) * per_gap;
     // A square's diagonal is √2 times its side.
     return min(half_px * select(2.0, 2.828427, is_square()), most);
 }
 
 // Linear light of a 5-6-5 sRGB colour.
 fn color_of(packed: u32) -> vec3f {
-    let encoded = vec3f(f32(packed >> 11u) / 31.0, f32((packed >> 5u) & 63u) / 63.0, f32(packed & 31u) / 31.0);
-    return select(pow((encoded + 0.055) / 1.055, vec3f(2.4)), encoded / 12.92, encoded <= vec3f(0.04045));
+    let steps = vec3f(vec3u(packed >> 11u, (packed >> 5u) & 63u, packed & 31u));
+    let encoded = steps * vec3f(1.0 / 31.0, 1.0 / 63.0, 1.0 / 31.0);
+    let curve = pow((encoded + 0.055) * (1.0 / 1.055), vec3f(2.4));
+    return select(curve, encoded * (1.0 / 12.92), encoded <= vec3f(0.04045));
 }
 
 // Tangent of -π/4 … π/4, to the last bits of a float (the polynomial of the Cephes library's `tanf`). Devices may be slow at the
@@ -212,7 +217,7 @@ fn normal_of(code: u32) -> vec3f {
     let face = (code * 24819u) >> 26u;
     let row = (code * 10083u) >> 19u;
     let cell = vec2f(vec2u(code - row * 52u, row - face * 52u));
-    let slopes = tangent(0.7853981634 * ((cell * 2.0 + 1.0) / 52.0 - 1.0));
+    let slopes = tangent(0.7853981634 * ((cell * 2.0 + 1.0) * (1.0 / 52.0) - 1.0));
     let axis = face >> 1u;
     let major = inverseSqrt(1.0 + dot(slopes, slopes));
     let minor = slopes * major;

@@ -21,6 +21,15 @@ pub(crate) fn pass_bytes(camera: &Camera) -> Vec<u8> {
     bytemuck::bytes_of(&PassParams::new(camera)).to_vec()
 }
 
+/// What a frame draws with.
+pub(crate) struct DepthTestFrame<'a> {
+    pub(crate) kernel: Kernel,
+    pub(crate) plan: &'a Plan,
+    pub(crate) chunks: &'a [Chunk],
+    pub(crate) passes: &'a Pool,
+    pub(crate) parts: &'a Pool,
+}
+
 impl DepthTestPass {
     /// Compiles the pass of a kernel that does not blend, once.
     pub(crate) fn prepare(&mut self, gpu: &Gpu, kernel: Kernel) {
@@ -33,10 +42,9 @@ impl DepthTestPass {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         gbuffer: &GBuffer,
-        kernel: Kernel,
-        (plan, chunks): (&Plan, &[Chunk]),
-        [passes, parts]: [&Pool; 2],
+        frame: &DepthTestFrame<'_>,
     ) {
+        let DepthTestFrame { kernel, plan, chunks, passes, parts } = *frame;
         let (pipeline, layout) = &self.pipelines[&kernel];
         let mut pass = gbuffer.begin(encoder, true);
         pass.set_pipeline(pipeline);
