@@ -5,6 +5,7 @@
 mod counting;
 #[path = "formats/make.rs"]
 mod make;
+#[allow(dead_code)]
 #[path = "ply/sources.rs"]
 mod sources;
 

@@ -63,7 +63,7 @@ impl Column {
         let used = (self.taken / 8) as usize;
         self.bytes.drain(..used);
         self.taken -= 8 * used as u64;
-        self.come += 8 * bytes as u64 - 8 * used as u64;
+        self.come = self.come + 8 * bytes as u64 - 8 * used as u64;
         let before = self.bytes.len();
         self.bytes.resize(before + bytes, 0);
         &mut self.bytes[before..]

@@ -215,7 +215,10 @@ impl Data {
         let component = match Component::of(sparse.indices.component_type) {
             Some(component @ (Component::U8 | Component::U16 | Component::U32)) => component,
             _ => {
-                return Err(malformed("sparse indices of unsigned integers", sparse.indices.component_type.to_string()));
+                return Err(malformed(
+                    "sparse indices of unsigned integers",
+                    sparse.indices.component_type.to_string(),
+                ));
             }
         };
         let bytes = sparse.count.saturating_mul(component.bytes() as u64);

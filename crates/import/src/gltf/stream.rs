@@ -241,7 +241,8 @@ impl GltfStream {
     }
 
     fn add_vertices(&mut self, part: &Part, step: &mut Step, batch: &mut Batch) -> Result<(), ImportError> {
-        let count = STEP.min(step.vertices.end - step.vertices.start);
+        let room = (Batch::TARGET - batch.vertices.positions.len()) as u64;
+        let count = STEP.min(room).min(step.vertices.end - step.vertices.start);
         let first = step.vertices.start;
         let attributes = self.primitive(part).attributes;
         let Self { data, rows, .. } = self;
@@ -296,7 +297,8 @@ impl GltfStream {
     }
 
     fn add_triangles(&mut self, part: &Part, step: &mut Step, batch: &mut Batch) -> Result<(), ImportError> {
-        let count = STEP.min(step.triangles.end - step.triangles.start);
+        let room = (Batch::TARGET - batch.triangles.len()) as u64;
+        let count = STEP.min(room).min(step.triangles.end - step.triangles.start);
         let first = step.triangles.start;
         step.triangles.start += count;
         self.done += count;

@@ -443,10 +443,9 @@ fn errors_name_what_is_wrong() {
             json!(5122),
             "expected indices of unsigned integers, found component type 5122 (byte 0, accessor 2)",
         ),
-        ("/bufferViews/0/byteLength", json!(1 << 40), ""),
         (
             "/bufferViews/0/byteOffset",
-            json!(1 << 40),
+            json!(1u64 << 40),
             "expected 48 bytes at byte 1099511627776 of the buffer, found fewer (byte 0, buffer 0)",
         ),
         (
@@ -461,13 +460,11 @@ fn errors_name_what_is_wrong() {
             "expected JSON of glTF, found invalid type: string \"two\", expected usize at line 1 column ",
         ),
     ] {
-        if !expected.is_empty() {
-            let found = with(path, value);
-            assert!(
-                found == expected || expected.ends_with("column ") && found.starts_with(expected),
-                "{found}\n{expected}"
-            );
-        }
+        let found = with(path, value);
+        assert!(
+            found == expected || expected.ends_with("column ") && found.starts_with(expected),
+            "{found}\n{expected}"
+        );
     }
     let mut gltf = square();
     gltf.json["extensionsRequired"] = json!(["KHR_materials_unlit", "ACME_boxes"]);

@@ -227,7 +227,8 @@ pub(crate) fn square() -> Gltf {
     let position = gltf.floats(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
     let normal = gltf.floats(&[[0.0, 0.0, 1.0]; 4]);
     let indices = gltf.indices(&[0, 1, 2, 0, 2, 3]);
-    let mesh = gltf.mesh(json!({ "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices }));
+    let mesh =
+        gltf.mesh(json!({ "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices, "mode": 4 }));
     gltf.node(json!({ "mesh": mesh }));
     gltf
 }
@@ -276,6 +277,7 @@ pub(crate) fn draco(size: u16) -> (Gltf, Vec<[f32; 3]>, Vec<u32>) {
         attribute.buffer_mut().write(number * 12, &bytes);
     }
     let number = mesh.add_attribute(attribute);
+    mesh.set_num_faces(indices.len() / 3);
     mesh.set_faces_from_flat_indices(&indices);
     let unique = mesh.attribute(number).unique_id();
     let mut encoder = MeshEncoder::new();

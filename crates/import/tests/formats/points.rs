@@ -129,16 +129,16 @@ fn wrong_pcd_is_refused() {
             "expected `DATA`, then ascii, binary or binary_compressed, found `DATA packed` (line 11)",
         ),
         (with("DATA binary\n", ""), "the file ends before the line `DATA` (line 11)"),
-        (with("binary", "binary"), "the file ends before point 0 of 3 is complete (byte 201)"),
+        (with("binary", "binary"), "the file ends before point 0 of 3 is complete (byte 219)"),
         (with("binary", "ascii"), "the file ends before point 0 of 3 is complete (line 12)"),
-        (with("binary", "binary_compressed"), "the file ends before its compressed points are complete (byte 212)"),
+        (with("binary", "binary_compressed"), "the file ends before its compressed points are complete (byte 230)"),
         (with("COUNT 1", "COUNT 9999999"), "expected whole numbers, found `COUNT 9999999 1 1 1 1 1 1` (line 6)"),
     ] {
         assert_eq!(error(text.as_bytes()), expected);
     }
     let mut lies = with("binary", "binary_compressed").into_bytes();
     lies.extend([255, 255, 255, 255, 84, 0, 0, 0, 5 << 5, 9]);
-    assert_eq!(error(&lies), "expected sound LZF data, found damage (byte 221)");
+    assert_eq!(error(&lies), "expected sound LZF data, found damage (byte 239)");
 }
 
 #[test]
@@ -226,7 +226,7 @@ fn scans_of_e57_are_put_in_their_places() {
         assert!((0..3).all(|axis| (moved[axis] - there[axis]).abs() < 1e-6), "{moved:?}, {there:?}");
     }
     assert_eq!(model.colors.len(), 2 * expected.len());
-    assert_eq!(model.colors[..4], [[0, 255, 0], [1, 255, 0], [2, 255, 0], [4, 255, 0]]);
+    assert_eq!(model.colors[..4], [[0, 255, 7], [1, 255, 7], [2, 255, 7], [4, 255, 7]]);
 }
 
 #[test]
@@ -243,5 +243,6 @@ fn damaged_e57_names_what_is_wrong() {
         error(&lies),
         format!("expected a description of at most {most} bytes, found 18446744073709551615 (byte 32)")
     );
-    assert!(error(&good[..2048]).starts_with("expected an E57 file, found "));
+    let cut = error(&good[..good.len() - 1024]);
+    assert!(cut.starts_with("expected an E57 file, found ") && cut.ends_with("(byte 0)"), "{cut}");
 }
