@@ -131,7 +131,16 @@ impl Buffers {
                     },
                 )
             }
-            None => Ok(view.byte_length),
+            None => {
+                let there = self.content_bytes(view.buffer);
+                let end = view.byte_offset.checked_add(view.byte_length);
+                if end.is_none_or(|end| end > there) {
+                    let expected = format!("a view within the {there} bytes of the buffer");
+                    let found = format!("{} bytes at byte {}", view.byte_length, view.byte_offset);
+                    return Err(ImportError::malformed(expected, found, item("bufferView", number)));
+                }
+                Ok(view.byte_length)
+            }
         }
     }
 

@@ -2,6 +2,8 @@
 //!
 //! Written against the specification rather than with the crate `gltf`: that one refuses a file which requires an extension it
 //! does not know (packed buffers are such), and without its checks it panics on numbers that name nothing.
+//!
+//! What is listed most is small, since a few characters of text can stand for it.
 
 use serde::Deserialize;
 
@@ -33,14 +35,14 @@ pub(super) struct Asset {
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Scene {
-    pub(super) nodes: Vec<usize>,
+    pub(super) nodes: Vec<u32>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
-    pub(super) children: Vec<usize>,
-    pub(super) mesh: Option<usize>,
+    pub(super) children: Vec<u32>,
+    pub(super) mesh: Option<u32>,
     pub(super) matrix: Option<Box<[f64; 16]>>,
     pub(super) translation: Option<Box<[f64; 3]>>,
     pub(super) rotation: Option<Box<[f64; 4]>>,

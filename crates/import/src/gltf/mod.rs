@@ -30,9 +30,17 @@ use crate::{ImportError, ModelStream, Place, SideFiles, error::said, input::Inpu
 use accessors::Data;
 use buffers::Buffers;
 
+/// Most objects in the JSON, braces in strings among them: each may take a hundred bytes and more.
+const MOST_OBJECTS: usize = 1 << 21;
+
 /// Reads the JSON of a file that is [recognised](recognises), and checks what it says.
 pub(crate) fn open(input: Input, mut side: Box<dyn SideFiles>) -> Result<Box<dyn ModelStream>, ImportError> {
     let container = container::open(input)?;
+    let objects = memchr::memchr_iter(b'{', &container.json).count();
+    if objects > MOST_OBJECTS {
+        let expected = format!("JSON of at most {MOST_OBJECTS} objects");
+        return Err(ImportError::malformed(expected, objects.to_string(), Place::byte(container.json_offset)));
+    }
     let root: json::Root = serde_json::from_slice(&container.json).map_err(|error| {
         let place = match container.json_offset {
             0 => Place::line(error.line() as u64),

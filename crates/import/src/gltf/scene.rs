@@ -6,14 +6,14 @@ use super::{
     json,
 };
 use crate::{CornerBatch, ImportError, Material, Place, Texture};
-use glam::{DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat4, DQuat, DVec3};
+use std::collections::HashMap;
 
 /// A mesh at a node.
 pub(super) struct Draw {
-    pub(super) mesh: usize,
-    pub(super) matrix: DMat4,
-    /// Where its instances differ; otherwise there is one.
-    pub(super) instancing: Option<json::InstanceAttributes>,
+    pub(super) mesh: u32,
+    pub(super) node: u32,
+    pub(super) matrix: DAffine3,
     pub(super) instances: u64,
 }
 
@@ -61,52 +61,73 @@ pub(super) fn draws(data: &Data) -> Result<Vec<Draw>, ImportError> {
     let root = &data.root;
     let mut draws = Vec::new();
     let mut is_seen = vec![false; root.nodes.len()];
-    let mut open: Vec<(usize, DMat4)> = match (root.scene, root.scenes.first()) {
+    let roots: Vec<u32> = match (root.scene, root.scenes.first()) {
         (Some(number), _) => {
             let scene = root.scenes.get(number).ok_or_else(|| missing("scene", number, root.scenes.len()))?;
-            scene.nodes.iter().map(|&node| (node, DMat4::IDENTITY)).collect()
+            scene.nodes.clone()
         }
-        (None, Some(first)) => first.nodes.iter().map(|&node| (node, DMat4::IDENTITY)).collect(),
+        (None, Some(first)) => first.nodes.clone(),
         (None, None) => {
             // Without a scene, all nodes that are nobody's children.
             let mut is_child = is_seen.clone();
             for &child in root.nodes.iter().flat_map(|node| &node.children) {
-                is_child.get_mut(child).map(|is_child| *is_child = true);
+                is_child.get_mut(child as usize).map(|is_child| *is_child = true);
             }
-            (0..root.nodes.len()).filter(|&node| !is_child[node]).map(|node| (node, DMat4::IDENTITY)).collect()
+            (0..root.nodes.len() as u32).filter(|&node| !is_child[node as usize]).collect()
         }
     };
-    open.reverse();
+    let mut open: Vec<(u32, DAffine3)> = Vec::new();
+    let mut found = 0;
+    let mut add = |nodes: &[u32], matrix: DAffine3, open: &mut Vec<(u32, DAffine3)>| {
+        found += nodes.len();
+        // Each is at one place, so there are no more than in the list.
+        if let Some(&node) = nodes.first()
+            && found > root.nodes.len()
+        {
+            return Err(twice(node));
+        }
+        open.extend(nodes.iter().rev().map(|&node| (node, matrix)));
+        Ok(())
+    };
+    add(&roots, DAffine3::IDENTITY, &mut open)?;
     while let Some((number, parent)) = open.pop() {
-        let node = root.nodes.get(number).ok_or_else(|| missing("node", number, root.nodes.len()))?;
-        if std::mem::replace(&mut is_seen[number], true) {
-            let place = item("node", number);
-            return Err(ImportError::malformed("each node at one place of a tree", "it at two", place));
+        let place = || item("node", number as usize);
+        let node = root.nodes.get(number as usize).ok_or_else(|| missing("node", number as usize, root.nodes.len()))?;
+        if std::mem::replace(&mut is_seen[number as usize], true) {
+            return Err(twice(number));
         }
         let matrix = parent * local(node);
         if !matrix.is_finite() {
-            return Err(ImportError::malformed("a finite transform", "another", item("node", number)));
+            return Err(ImportError::malformed("a finite transform", "another", place()));
         }
         if let Some(mesh) = node.mesh {
-            if mesh >= root.meshes.len() {
-                return Err(missing("mesh", mesh, root.meshes.len()));
+            if mesh as usize >= root.meshes.len() {
+                return Err(missing("mesh", mesh as usize, root.meshes.len()));
             }
-            let instancing = node.extensions.as_ref().and_then(|it| it.instancing.as_ref()).map(|it| it.attributes);
-            let instances = match instancing {
-                Some(attributes) => instances(data, attributes, number)?,
+            let instances = match instancing(node) {
+                Some(attributes) => instances(data, attributes, number as usize)?,
                 None => 1,
             };
-            draws.push(Draw { mesh, matrix, instancing, instances });
+            draws.push(Draw { mesh, node: number, matrix, instances });
         }
-        open.extend(node.children.iter().rev().map(|&child| (child, matrix)));
+        add(&node.children, matrix, &mut open)?;
     }
     Ok(draws)
 }
 
+fn twice(node: u32) -> ImportError {
+    ImportError::malformed("each node at one place of a tree", "it at two", item("node", node as usize))
+}
+
+/// Where the instances of a node differ; otherwise there is one.
+pub(super) fn instancing(node: &json::Node) -> Option<json::InstanceAttributes> {
+    node.extensions.as_ref()?.instancing.as_ref().map(|instancing| instancing.attributes)
+}
+
 /// The transform of a node to its parent.
-fn local(node: &json::Node) -> DMat4 {
+fn local(node: &json::Node) -> DAffine3 {
     match &node.matrix {
-        Some(columns) => DMat4::from_cols_array(columns),
+        Some(columns) => DAffine3::from_mat4(DMat4::from_cols_array(columns)),
         None => transform(
             node.translation.as_deref().copied().unwrap_or([0.0; 3]),
             node.rotation.as_deref().copied().unwrap_or([0.0, 0.0, 0.0, 1.0]),
@@ -116,11 +137,11 @@ fn local(node: &json::Node) -> DMat4 {
 }
 
 /// From a translation, a rotation as a quaternion x y z w of any length but 0, and a scale.
-pub(super) fn transform(translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3]) -> DMat4 {
+pub(super) fn transform(translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3]) -> DAffine3 {
     let rotation = DQuat::from_array(rotation);
     let length = rotation.length();
     let rotation = if length > 0.0 && length.is_finite() { rotation / length } else { DQuat::IDENTITY };
-    DMat4::from_scale_rotation_translation(DVec3::from_array(scale), rotation, DVec3::from_array(translation))
+    DAffine3::from_scale_rotation_translation(DVec3::from_array(scale), rotation, DVec3::from_array(translation))
 }
 
 /// Number of instances: that of all accessors there are.
@@ -130,6 +151,10 @@ fn instances(data: &Data, attributes: json::InstanceAttributes, node: usize) -> 
     for (accessor, components) in counts {
         let Some(accessor) = accessor else { continue };
         let found = data.check(accessor, &[components])?;
+        if data.root.accessors[accessor].buffer_view.is_none() {
+            let place = item("accessor", accessor);
+            return Err(ImportError::malformed("a view for attributes of instances", "none", place));
+        }
         if count.is_some_and(|count| count != found) {
             let expected = "as many of each attribute of instances";
             return Err(ImportError::malformed(expected, "other numbers", item("node", node)));
@@ -142,6 +167,10 @@ fn instances(data: &Data, attributes: json::InstanceAttributes, node: usize) -> 
 /// Primitives of a mesh that make points or triangles, checked.
 pub(super) fn parts(data: &Data, mesh: usize) -> Result<Vec<Part>, ImportError> {
     let primitives = &data.root.meshes[mesh].primitives;
+    let mut users: HashMap<Option<usize>, usize> = HashMap::new();
+    for primitive in primitives {
+        *users.entry(primitive.attributes.position).or_default() += 1;
+    }
     let mut parts = Vec::new();
     for (number, primitive) in primitives.iter().enumerate() {
         let topology = match primitive.mode {
@@ -158,6 +187,9 @@ pub(super) fn parts(data: &Data, mesh: usize) -> Result<Vec<Part>, ImportError> 
         let draco = primitive.extensions.as_ref().and_then(|it| it.draco.as_ref());
         let vertices = data.check(position, &[3])?;
         let indices = primitive.indices.map_or(Ok(vertices), |indices| data.check(indices, &[1]))?;
+        if vertices == 0 || (indices == 0 && draco.is_none()) {
+            continue;
+        }
         let same = |accessor: Option<usize>, components: &[usize]| -> Result<(), ImportError> {
             match accessor {
                 Some(accessor) if data.check(accessor, components)? != vertices => {
@@ -184,7 +216,6 @@ pub(super) fn parts(data: &Data, mesh: usize) -> Result<Vec<Part>, ImportError> 
         if let Some(used) = used {
             same(set(&primitive.attributes, used), &[2])?;
         }
-        let users = primitives.iter().filter(|other| other.attributes.position == Some(position)).count();
         parts.push(Part {
             mesh,
             primitive: number,
@@ -195,7 +226,7 @@ pub(super) fn parts(data: &Data, mesh: usize) -> Result<Vec<Part>, ImportError> 
             material: material.as_ref().map_or(CornerBatch::NONE, |&(number, _)| number as u32),
             color: material.map_or([1.0; 3], |(_, material)| material.color),
             is_packed: draco.is_some(),
-            is_shared: users > 1 && primitive.indices.is_some() && draco.is_none(),
+            is_shared: users[&Some(position)] > 1 && primitive.indices.is_some() && draco.is_none(),
         });
     }
     Ok(parts)

@@ -11,7 +11,7 @@ use super::{
     scene::{self, Draw, Part, Topology},
 };
 use crate::{Attributes, Batch, CornerBatch, ImportError, Material, ModelStream, error::Problem};
-use glam::{DMat3, DMat4, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub(super) struct GltfStream {
     data: Data,
     draws: Vec<Draw>,
     /// Parts of each mesh that is drawn.
-    parts: HashMap<usize, Arc<Vec<Part>>>,
+    parts: HashMap<u32, Arc<Vec<Part>>>,
     materials: Vec<Material>,
     attributes: Attributes,
     declared: Option<[u64; 2]>,
@@ -37,6 +37,8 @@ pub(super) struct GltfStream {
     tex_coords: u64,
     /// A mesh that was unpacked last: mesh and primitive.
     decoded: Option<([usize; 2], Arc<Decoded>)>,
+    /// Vertices that primitives use of those they share.
+    used: HashMap<[usize; 2], Range<u64>>,
     rows: Rows,
     indices: Vec<u32>,
     /// Work done and in all, for progress.
@@ -47,7 +49,7 @@ pub(super) struct GltfStream {
 
 /// How far a primitive is.
 struct Step {
-    matrix: DMat4,
+    matrix: DAffine3,
     /// To turn normals; and whether the transform mirrors.
     normals: DMat3,
     is_mirrored: bool,
@@ -74,10 +76,10 @@ struct Rows {
 impl GltfStream {
     pub(super) fn new(data: Data, total_bytes: u64) -> Result<Self, ImportError> {
         let draws = scene::draws(&data)?;
-        let mut parts: HashMap<usize, Arc<Vec<Part>>> = HashMap::new();
+        let mut parts: HashMap<u32, Arc<Vec<Part>>> = HashMap::new();
         for draw in &draws {
             if !parts.contains_key(&draw.mesh) {
-                parts.insert(draw.mesh, Arc::new(scene::parts(&data, draw.mesh)?));
+                parts.insert(draw.mesh, Arc::new(scene::parts(&data, draw.mesh as usize)?));
             }
         }
         let all = || draws.iter().flat_map(|draw| parts[&draw.mesh].iter().map(move |part| (draw, part)));
@@ -111,6 +113,7 @@ impl GltfStream {
             vertices: 0,
             tex_coords: 0,
             decoded: None,
+            used: HashMap::new(),
             rows: Rows::default(),
             indices: Vec::new(),
             done: 0,
@@ -158,7 +161,7 @@ impl GltfStream {
     fn begin(&mut self, part: &Part) -> Result<Step, ImportError> {
         let draw = &self.draws[self.draw];
         let mut matrix = draw.matrix;
-        if let Some(attributes) = draw.instancing {
+        if let Some(attributes) = scene::instancing(&self.data.root.nodes[draw.node as usize]) {
             let mut row = |accessor: Option<usize>, default: [f64; 4]| -> Result<[f64; 4], ImportError> {
                 let Some(accessor) = accessor else { return Ok(default) };
                 self.data.read(accessor, self.instance, 1, &mut self.rows.positions)?;
@@ -186,7 +189,7 @@ impl GltfStream {
             let found = (self.vertices + count).to_string();
             return Err(ImportError::malformed("fewer than 4294967295 vertices", found, item("mesh", part.mesh)));
         }
-        let linear = DMat3::from_mat4(matrix);
+        let linear = matrix.matrix3;
         let determinant = linear.determinant();
         // The inverse transpose, but for its length.
         let sign = if determinant < 0.0 { -1.0 } else { 1.0 };
@@ -227,6 +230,10 @@ impl GltfStream {
 
     /// From the least to the greatest vertex that a primitive names.
     fn used_vertices(&mut self, part: &Part) -> Result<Range<u64>, ImportError> {
+        let key = [part.mesh, part.primitive];
+        if let Some(range) = self.used.get(&key) {
+            return Ok(range.clone());
+        }
         let Some(accessor) = self.primitive(part).indices else { return Ok(0..part.vertices) };
         let (mut low, mut high) = (u64::MAX, 0);
         for first in (0..part.indices).step_by(STEP as usize) {
@@ -237,7 +244,8 @@ impl GltfStream {
                 high = high.max(u64::from(index) + 1);
             }
         }
-        Ok(low.min(high)..high)
+        self.used.insert(key, low..high);
+        Ok(low..high)
     }
 
     fn add_vertices(&mut self, part: &Part, step: &mut Step, batch: &mut Batch) -> Result<(), ImportError> {

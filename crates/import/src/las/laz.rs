@@ -15,6 +15,8 @@ use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
 
 /// Largest chunk of layers, packed. Usual ones have a few hundred kilobytes.
 const MOST_CHUNK_BYTES: u64 = 256 << 20;
+/// Most extra bytes of a point: each has its own models.
+const MOST_EXTRA_BYTES: u16 = 1024;
 /// Most chunks in a table that must be read.
 const MOST_CHUNKS: u32 = 1 << 22;
 
@@ -46,7 +48,9 @@ pub(super) fn check(vlr: &LazVlr, record_bytes: usize) -> Result<(), String> {
     let Some(first) = items.first() else { return Err("none".to_owned()) };
     let is_layered = first.version() > 2;
     let has_own_size = |item: &LazItem| match item.item_type() {
-        LazItemType::Byte(size) | LazItemType::Byte14(size) => size == item.size() && size > 0,
+        LazItemType::Byte(size) | LazItemType::Byte14(size) => {
+            size == item.size() && (1..=MOST_EXTRA_BYTES).contains(&size)
+        }
         LazItemType::Point10 => item.size() == 20,
         LazItemType::GpsTime | LazItemType::RGBNIR14 => item.size() == 8,
         LazItemType::RGB12 | LazItemType::RGB14 => item.size() == 6,
@@ -98,7 +102,12 @@ impl LazRecords {
             let has_chunks = !is_point_wise_in_one(&vlr)?;
             let mut table = None;
             if has_chunks && vlr.uses_variable_size_chunks() {
-                check_table(&mut source, header.points_offset, end).map_err(failed)?;
+                check_table(&mut source, header.points_offset, end).map_err(|error| match error.kind() {
+                    io::ErrorKind::InvalidData => {
+                        ImportError::malformed("a table of chunks", error.to_string(), place.clone())
+                    }
+                    _ => failed(error),
+                })?;
                 source.seek(SeekFrom::Start(header.points_offset)).map_err(failed)?;
                 table = Some(ChunkTable::read_from(&mut source, &vlr).map_err(cannot)?);
             } else if has_chunks {
@@ -228,13 +237,13 @@ fn check_table(source: &mut Source, points_offset: u64, end: u64) -> io::Result<
         table = u64::from_le_bytes(word);
     }
     if table <= points_offset || table > end {
-        return Err(invalid("no table of chunks"));
+        return Err(invalid("none"));
     }
     source.seek(SeekFrom::Start(table))?;
     source.read_exact(&mut word)?;
     let [.., a, b, c, d] = word;
     if u32::from_le_bytes([a, b, c, d]) > MOST_CHUNKS {
-        return Err(invalid("a table of too many chunks"));
+        return Err(invalid("one of too many chunks"));
     }
     Ok(())
 }

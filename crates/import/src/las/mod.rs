@@ -21,6 +21,11 @@ use gigalod_geom::camera::UpAxis;
 use glam::DVec3;
 use header::Header;
 
+/// Most bytes of records in memory: fewer points make a batch where each has thousands of extra bytes.
+const MOST_PIECE_BYTES: usize = 8 << 20;
+/// Most points for each byte of a LAZ file. Real ones have one or less; packed nothings could go on for ever.
+const MOST_POINTS_PER_BYTE: u64 = 64;
+
 /// True for a file that begins with the signature.
 pub(crate) fn recognises(start: &[u8]) -> bool {
     start.starts_with(b"LASF")
@@ -30,6 +35,11 @@ pub(crate) fn recognises(start: &[u8]) -> bool {
 pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError> {
     let header = header::read(&mut input)?;
     let total_bytes = input.progress().1;
+    let most = (total_bytes * MOST_POINTS_PER_BYTE).max(Batch::TARGET as u64);
+    if header.laz.is_some() && header.point_count > most {
+        let expected = format!("at most {most} points in a LAZ file of {total_bytes} bytes");
+        return Err(ImportError::malformed(expected, header.point_count.to_string(), Place::byte(247)));
+    }
     let records = match &header.laz {
         None => {
             let before = header.points_offset - input.offset();
@@ -79,7 +89,8 @@ impl LasStream {
     /// Reads the records of the next batch.
     fn fill(&mut self) -> Result<(), ImportError> {
         let Self { header, records, piece, .. } = self;
-        let count = (header.point_count - self.read).min(Batch::TARGET as u64) as usize;
+        let most = Batch::TARGET.min(MOST_PIECE_BYTES / header.record_bytes) as u64;
+        let count = (header.point_count - self.read).min(most) as usize;
         let bytes = count * header.record_bytes;
         match records {
             Records::Plain(input) => {

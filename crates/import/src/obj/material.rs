@@ -9,6 +9,8 @@ use std::collections::HashMap;
 
 /// Most materials of a model, so that hostile names take bounded memory.
 const MOST: usize = 1 << 16;
+/// Most libraries that are looked for.
+const MOST_LIBRARIES: u32 = 256;
 /// Longest name in bytes.
 const MAX_NAME_BYTES: usize = 1024;
 
@@ -20,6 +22,8 @@ pub(super) struct Materials {
     numbers: HashMap<String, u32>,
     /// What libraries say, by name.
     library: HashMap<String, Material>,
+    /// Libraries that were looked for.
+    libraries: u32,
 }
 
 impl Materials {
@@ -40,16 +44,21 @@ impl Materials {
     pub(super) fn read_library(&mut self, rest: &[u8], side: &mut dyn SideFiles) {
         // The rest of the line is one name, perhaps with blanks, or several.
         let whole = name(rest);
-        match side.open(&whole) {
-            Ok(source) => _ = self.read(source),
-            Err(_) => {
-                for name in whole.split_ascii_whitespace().take(16) {
-                    if let Ok(source) = side.open(name) {
-                        _ = self.read(source);
-                    }
-                }
+        if !self.read_file(&whole, side) {
+            for name in whole.split_ascii_whitespace() {
+                self.read_file(name, side);
             }
         }
+    }
+
+    /// Reads a library if it can be had.
+    fn read_file(&mut self, name: &str, side: &mut dyn SideFiles) -> bool {
+        if self.libraries == MOST_LIBRARIES {
+            return false;
+        }
+        self.libraries += 1;
+        // What is wrong with it is no error of the model.
+        side.open(name).map(|source| self.read(source)).is_ok()
     }
 
     fn read(&mut self, source: Box<dyn crate::ByteSource>) -> Result<(), crate::ImportError> {

@@ -446,12 +446,12 @@ fn errors_name_what_is_wrong() {
         (
             "/bufferViews/0/byteOffset",
             json!(1u64 << 40),
-            "expected 48 bytes at byte 1099511627776 of the buffer, found fewer (byte 0, buffer 0)",
+            "expected a view within the 108 bytes of the buffer, found 48 bytes at byte 1099511627776 (byte 0, bufferView 0)",
         ),
         (
             "/bufferViews/0/buffer",
             json!(3),
-            "expected 48 bytes at byte 0 of the buffer, found fewer (byte 0, buffer 3)",
+            "expected a view within the 0 bytes of the buffer, found 48 bytes at byte 0 (byte 0, bufferView 0)",
         ),
         ("/meshes/0/primitives/0/mode", json!(7), "expected a mode from 0 to 6, found 7 (byte 0, mesh 0)"),
         (
