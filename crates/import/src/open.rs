@@ -11,13 +11,16 @@ use crate::{
     las, obj, off, pcd, ply, stl, xyz,
 };
 
+/// What comes of opening a file.
+type Opened = Result<Box<dyn ModelStream>, ImportError>;
+
 /// A format that this crate reads.
 struct Format {
     name: &'static str,
     /// True when a file that starts with these bytes (at most [`START_BYTES`], fewer in a shorter file), and has so many if
     /// that is known, is of this format. Earlier rows are asked first.
     recognises: fn(&[u8], Option<u64>) -> bool,
-    open: fn(Input, Box<dyn SideFiles>) -> Result<Box<dyn ModelStream>, ImportError>,
+    open: fn(Input, Box<dyn SideFiles>) -> Opened,
 }
 
 const FORMATS: &[Format] = &[

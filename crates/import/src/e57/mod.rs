@@ -155,7 +155,7 @@ impl Scan {
             if !translation.is_finite() || !(1e-6..1e6).contains(&length) {
                 return malformed("a pose with a unit quaternion", format!("one of length {length}"));
             }
-            rotation = rotation / length;
+            rotation /= length;
         }
         let is_spherical = cartesian.is_none();
         Ok(Self { columns, position, is_spherical, invalid, color, rotation, translation, left: cloud.records, number })

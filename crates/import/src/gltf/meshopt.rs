@@ -78,7 +78,7 @@ fn attributes(bytes: &[u8], count: usize, stride: usize) -> Found<Vec<u8>> {
     let mut body = Bytes(&body[1..]);
     let mut last = tail[tail_bytes - stride..].to_vec();
     let mut vertices = Vec::new();
-    let block = (8192 / stride & !15).min(256);
+    let block = ((8192 / stride) & !15).min(256);
     while vertices.len() < count * stride {
         let start = vertices.len();
         let elements = block.min(count - start / stride);

@@ -71,7 +71,9 @@ pub(super) fn draws(data: &Data) -> Result<Vec<Draw>, ImportError> {
             // Without a scene, all nodes that are nobody's children.
             let mut is_child = is_seen.clone();
             for &child in root.nodes.iter().flat_map(|node| &node.children) {
-                is_child.get_mut(child as usize).map(|is_child| *is_child = true);
+                if let Some(is_child) = is_child.get_mut(child as usize) {
+                    *is_child = true;
+                }
             }
             (0..root.nodes.len() as u32).filter(|&node| !is_child[node as usize]).collect()
         }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{Attributes, Batch, CornerBatch, ImportError, Material, ModelStream, error::Problem};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -78,8 +78,8 @@ impl GltfStream {
         let draws = scene::draws(&data)?;
         let mut parts: HashMap<u32, Arc<Vec<Part>>> = HashMap::new();
         for draw in &draws {
-            if !parts.contains_key(&draw.mesh) {
-                parts.insert(draw.mesh, Arc::new(scene::parts(&data, draw.mesh as usize)?));
+            if let Entry::Vacant(entry) = parts.entry(draw.mesh) {
+                entry.insert(Arc::new(scene::parts(&data, draw.mesh as usize)?));
             }
         }
         let all = || draws.iter().flat_map(|draw| parts[&draw.mesh].iter().map(move |part| (draw, part)));
