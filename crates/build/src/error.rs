@@ -12,11 +12,8 @@ pub enum BuildError {
     #[error(transparent)]
     Import(#[from] ImportError),
     /// Nothing to show.
-    #[error("no triangles, expected at least one ({vertices} vertices without a face)")]
-    NoTriangles {
-        /// Vertices read.
-        vertices: u64,
-    },
+    #[error("no triangles and no points, expected at least one")]
+    Nothing,
     /// Local space is `f32`.
     #[error("the model is {extent:e} units wide, expected at most 1e30")]
     TooWide {

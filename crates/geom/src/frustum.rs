@@ -37,6 +37,11 @@ impl Frustum {
         }
     }
 
+    /// Unit normals of the five planes, which point inwards and pass through the eye.
+    pub fn planes(&self) -> &[Vec3; 5] {
+        &self.inward
+    }
+
     /// Where the ball around `center_in_eye` lies. Sound, not tight: a ball near an edge of the volume may be `Crossing`
     /// although it is outside.
     pub fn side(&self, center_in_eye: Vec3, radius: f32) -> Side {

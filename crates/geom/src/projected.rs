@@ -27,7 +27,7 @@ pub fn exceeds_px(depth: f32, distance_squared: f32, radius: f32, focal_px: f32,
         return false;
     }
     if depth <= radius {
-        return true;
+        return threshold_px < f32::INFINITY;
     }
     let gap = (depth - radius) * (depth + radius) * threshold_px;
     let reach = 2.0 * focal_px * radius;
@@ -71,6 +71,7 @@ mod tests {
     fn a_ball_around_the_eye_is_larger_than_any_threshold() {
         assert_eq!(diameter_px(0.5, 0.25, 1.0, 900.0), f32::INFINITY);
         assert!(exceeds_px(-3.0, 9.0, 1.0, 900.0, 1e30));
+        assert!(!exceeds_px(-3.0, 9.0, 1.0, 900.0, f32::INFINITY));
         assert_eq!(diameter_px(0.0, 0.0, 0.0, 900.0), 0.0);
     }
 }

@@ -14,7 +14,7 @@ use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Lighting, Look, Renderer};
 use gigalod::runtime::residency::InlineLoader;
 use gigalod::runtime::splats::MATERIAL_SRGB;
-use gigalod::runtime::{Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::runtime::{Fineness, Instance, Residency, Scene, Similarity, ViewId};
 use gigalod::verify;
 use gigalod_reference::judge::{Drawn, judge};
 use gigalod_reference::raytrace::supersampled_coverage;
@@ -46,7 +46,7 @@ fn main() -> Result<()> {
     scene.add(Instance { file: id, placement: Similarity::IDENTITY });
 
     let camera = Camera::orbit(&mesh.bounds(), up, orbit_deg, zoom, 40f64.to_radians(), SIZE);
-    let report = scene.select_converged(ViewId(0), &camera, threshold_px as f32);
+    let report = scene.select_converged(ViewId(0), &camera, &Fineness::px(threshold_px as f32));
     let draws = scene.draws(ViewId(0)).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
     let frame = Frame { camera, look: Look::default(), draws };
     let drawn = Renderer::new(Gpu::open()?)?.picture(&frame)?;

@@ -44,18 +44,6 @@ fn a_build_that_fails_leaves_the_old_file_and_nothing_new() {
 }
 
 #[test]
-fn a_point_cloud_is_refused_with_a_hint() {
-    let folder = tempfile::tempdir().unwrap();
-    let (points, out) = (folder.path().join("points.ply"), folder.path().join("a.glod"));
-    let header =
-        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
-    std::fs::write(&points, format!("{header}0 0 0\n1 2 3\n")).unwrap();
-    let ran = run!["build", points, "-o", out, "--json"];
-    assert!(ran.failed(&points).contains("no triangles"));
-    assert!(ran.stderr.contains("\nhint: "), "{ran:?}");
-}
-
-#[test]
 fn no_command_replaces_its_own_input() {
     let folder = tempfile::tempdir().unwrap();
     let (ply, glod) = (folder.path().join("a.ply"), folder.path().join("a.glod"));

@@ -304,7 +304,7 @@ fn too_small_a_budget_is_kept_and_said() {
     let budget = whole["cpu_bytes"].as_u64().unwrap() / 3;
     let report = easel.report(model, &format!("--cpu-budget {budget}"));
     assert!(report["cpu_bytes"].as_u64().unwrap() <= budget, "{report}");
-    assert_eq!((&report["converged"], &report["limited_by"]), (&false.into(), &"residency".into()));
+    assert_eq!((&report["converged"], &report["limited_by"]), (&false.into(), &"budget".into()));
     assert!(report["max_error_px"].as_f64() >= whole["max_error_px"].as_f64());
     let (drawn, all) = (report["drawn"]["nodes"].as_u64(), whole["drawn"]["nodes"].as_u64());
     assert!(drawn > Some(0) && drawn < all, "coarser, but all of it");

@@ -27,7 +27,7 @@ fn is_covered_from_twelve_sides(model: &str, path: &Path, mut renderer: Renderer
     let mut scene = scene(built(path, folder.path()));
     let mesh = mesh(path);
     let bvh = Bvh::build(&mesh);
-    let mut psnr = [vec![], vec![]];
+    let mut psnr = [vec![], vec![], vec![]];
     for orbit_deg in twelve_directions() {
         let camera = Camera::orbit(&mesh.bounds(), UpAxis::Y, orbit_deg, 1.0, 40f64.to_radians(), SIZE);
         let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
@@ -39,7 +39,7 @@ fn is_covered_from_twelve_sides(model: &str, path: &Path, mut renderer: Renderer
         };
         let expected = shade::picture(&truth, &shading);
         let mask = metrics::silhouette_mask(&truth);
-        for (kernel, psnr) in [Kernel::Square, Kernel::Round].into_iter().zip(&mut psnr) {
+        for (kernel, psnr) in [Kernel::Square, Kernel::Round, Kernel::Gauss].into_iter().zip(&mut psnr) {
             let (report, picture) = draw(&mut scene, &mut renderer, &camera, 1.0, kernel);
             let limited = report.limited_by.is_some().then_some(&picture.footprint_px[..]);
             let verdict = judge(&truth, &touched, &Drawn { depth: &picture.depth, data_footprint_px: limited }, 1.0);
@@ -55,9 +55,9 @@ fn is_covered_from_twelve_sides(model: &str, path: &Path, mut renderer: Renderer
             psnr.extend(metrics::psnr_db(&expected, &rgb(&picture), Some(&mask)));
         }
     }
-    let [square, round] = psnr.map(|all| all.iter().sum::<f64>() / all.len() as f64);
-    println!("{model}: mean PSNR to the ray tracer {square:.2} dB (square), {round:.2} dB (round)");
-    assert!(round > 15.0, "the picture is recognisable");
+    let [square, round, gauss] = psnr.map(|all| all.iter().sum::<f64>() / all.len() as f64);
+    println!("{model}: mean PSNR to the ray tracer {square:.2} dB (square), {round:.2} (round), {gauss:.2} (gauss)");
+    assert!(round > 15.0 && gauss > 15.0, "the picture is recognisable");
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn bunny_has_no_holes_close_up_at_grazing_angles_and_from_inside() {
         let camera = Camera::look_at(eye, target, glam::DVec3::Y, 40f64.to_radians(), SIZE);
         let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
         let touched = supersampled_coverage(&bvh, &camera, 4);
-        for kernel in [Kernel::Square, Kernel::Round] {
+        for kernel in [Kernel::Square, Kernel::Round, Kernel::Gauss] {
             let (_, picture) = draw(&mut scene, &mut renderer, &camera, 1.0, kernel);
             let footprint = Some(&picture.footprint_px[..]);
             let verdict = judge(&truth, &touched, &Drawn { depth: &picture.depth, data_footprint_px: footprint }, 1.0);

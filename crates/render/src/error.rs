@@ -1,7 +1,7 @@
 //! Why there is no picture.
 
 /// Why a picture could not be drawn.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
     /// No driver, most likely.
@@ -10,6 +10,9 @@ pub enum RenderError {
     /// The adapter would not open.
     #[error("the graphics adapter gave no device: {0}")]
     NoDevice(String),
+    /// [`crate::GpuLevel::from_env`] found another word.
+    #[error("GIGALOD_GPU_LEVEL is {0:?}, expected webgl, webgpu or native")]
+    Level(String),
     /// Larger than the adapter's textures.
     #[error("a picture of {width}x{height} pixels, expected 1 to {limit} each way")]
     Size {
@@ -20,7 +23,27 @@ pub enum RenderError {
         /// The adapter's.
         limit: u32,
     },
-    /// Something the renderer did was wrong, or the device is lost or out of memory.
+    /// This frame needs more than [`crate::Renderer::set_budget`] allows. Nothing was drawn; draw coarser.
+    #[error("the frame needs {needed} bytes on the graphics device, expected at most {budget}")]
+    Budget {
+        /// Bytes that this frame would take at least.
+        needed: u64,
+        /// Bytes allowed.
+        budget: u64,
+    },
+    /// More splats than 32-bit numbers can name.
+    #[error("{0} splats in a frame, expected fewer than 4294967295")]
+    TooMany(u64),
+    /// The kernel cannot be drawn by the depth test alone, and this device can do no more.
+    #[error("the graphics device cannot blend splats: it has no storage buffers to write to")]
+    CannotBlend,
+    /// The device had not the memory. The renderer has freed what it kept and can be used: draw coarser.
+    #[error("the graphics device is out of memory: {0}")]
+    OutOfMemory(String),
+    /// The device is gone, with all that was on it: a driver was reset or removed. [`crate::Renderer::recover`] opens it anew.
+    #[error("the graphics device was lost: {0}")]
+    DeviceLost(String),
+    /// Something the renderer did was wrong.
     #[error("the graphics device reports: {0}")]
     Device(String),
     /// A draw source of a kind that this renderer did not make.

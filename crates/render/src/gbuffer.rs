@@ -2,7 +2,7 @@
 
 use gigalod_geom::ImageSize;
 
-/// sRGB-encoded, alpha 1 where there is a surface.
+/// sRGB-encoded; alpha is 1 where there is a surface, less where a blended one ends.
 pub(crate) const ALBEDO: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 /// World space; w holds the extent in pixels of what was drawn there.
 pub(crate) const NORMAL: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -14,6 +14,24 @@ pub(crate) const NO_DEPTH: wgpu::Color = wgpu::Color { r: 0x7f80_0000 as f64, g:
 /// For the depth test alone. near / z: 1 at the near plane, 0 at infinity; as a float that has the same relative precision at
 /// all distances.
 pub(crate) const DEPTH_TEST: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// What passes draw to, in this order.
+pub(crate) const COLOR_TARGETS: [Option<wgpu::ColorTargetState>; 3] = [target(ALBEDO), target(NORMAL), target(DEPTH)];
+
+const fn target(format: wgpu::TextureFormat) -> Option<wgpu::ColorTargetState> {
+    Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL })
+}
+
+/// The depth test of a pass.
+pub(crate) fn depth_state(compare: wgpu::CompareFunction, write: bool) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format: DEPTH_TEST,
+        depth_write_enabled: Some(write),
+        depth_compare: Some(compare),
+        stencil: Default::default(),
+        bias: Default::default(),
+    }
+}
 
 /// The G-buffer of one picture size.
 #[derive(Debug)]
@@ -41,8 +59,52 @@ impl GBuffer {
     }
 
     /// Bytes on the device.
-    pub(crate) fn bytes(&self) -> u64 {
-        self.size.pixels() as u64 * (4 + 8 + 4 + 4)
+    pub(crate) fn bytes(size: ImageSize) -> u64 {
+        size.pixels() as u64 * (4 + 8 + 4 + 4)
+    }
+
+    /// A pass that draws to it; `clear`: what was there is forgotten.
+    pub(crate) fn begin<'a>(&self, encoder: &'a mut wgpu::CommandEncoder, clear: bool) -> wgpu::RenderPass<'a> {
+        let [albedo, normal, depth, depth_test] = [&self.albedo, &self.normal, &self.depth, &self.depth_test].map(view);
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("G-buffer"),
+            color_attachments: &[
+                Some(attachment(&albedo, clear, wgpu::Color::TRANSPARENT)),
+                Some(attachment(&normal, clear, wgpu::Color::TRANSPARENT)),
+                Some(attachment(&depth, clear, NO_DEPTH)),
+            ],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &depth_test,
+                depth_ops: Some(wgpu::Operations {
+                    load: if clear { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        })
+    }
+
+    /// Frees it.
+    pub(crate) fn free(&self) {
+        [&self.albedo, &self.normal, &self.depth, &self.depth_test].into_iter().for_each(wgpu::Texture::destroy);
+    }
+}
+
+/// A target that is cleared, or drawn over.
+pub(crate) fn attachment(
+    view: &wgpu::TextureView,
+    clear: bool,
+    color: wgpu::Color,
+) -> wgpu::RenderPassColorAttachment<'_> {
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load: if clear { wgpu::LoadOp::Clear(color) } else { wgpu::LoadOp::Load },
+            store: wgpu::StoreOp::Store,
+        },
     }
 }
 

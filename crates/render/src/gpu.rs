@@ -1,7 +1,39 @@
 //! The device: found, opened, and watched.
+//!
+//! Takes how much of the device may be used; gives a device whose errors are kept until somebody asks. What always holds: a lost
+//! device stays lost, and says so whatever else went wrong.
 
 use crate::RenderError;
 use std::sync::{Arc, Mutex};
+
+/// How much of what a device can do may be used. The picture is the same, but for what [`GpuLevel::WebGl`] says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum GpuLevel {
+    /// No compute passes, no storage buffers: splats are drawn by the depth test, and not with Gaussian kernels. Of two splats
+    /// equally near but for rounding, another may win.
+    WebGl,
+    /// The baseline of WebGPU and nothing beyond.
+    WebGpu,
+    /// All there is.
+    #[default]
+    Native,
+}
+
+impl GpuLevel {
+    /// What the environment variable `GIGALOD_GPU_LEVEL` asks for (`webgl`, `webgpu` or `native`), by default `native`: to see
+    /// on one device what another will show, or to get around a driver's faults.
+    ///
+    /// # Errors
+    /// [`RenderError::Level`].
+    pub fn from_env() -> Result<Self, RenderError> {
+        match std::env::var("GIGALOD_GPU_LEVEL").as_deref() {
+            Err(_) | Ok("" | "native") => Ok(Self::Native),
+            Ok("webgpu") => Ok(Self::WebGpu),
+            Ok("webgl") => Ok(Self::WebGl),
+            Ok(other) => Err(RenderError::Level(other.into())),
+        }
+    }
+}
 
 /// An open graphics device.
 #[derive(Debug)]
@@ -9,25 +41,45 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     info: wgpu::AdapterInfo,
-    /// First error since the last [`Gpu::check`].
-    error: Arc<Mutex<Option<String>>>,
+    /// Asked for.
+    wanted: GpuLevel,
+    /// Got.
+    level: GpuLevel,
+    faults: Arc<Mutex<Faults>>,
+}
+
+/// What went wrong since somebody asked.
+#[derive(Debug, Default)]
+struct Faults {
+    /// Stays.
+    lost: Option<String>,
+    /// The first since the last [`Gpu::check`].
+    first: Option<RenderError>,
 }
 
 impl Gpu {
     /// Opens the best adapter there is, without a window: a GPU, else a software one. `WGPU_BACKEND` chooses the interface, as
-    /// in all wgpu programs.
+    /// in all wgpu programs, and `GIGALOD_GPU_LEVEL` what may be used of it ([`GpuLevel::from_env`]).
+    ///
+    /// # Errors
+    /// [`RenderError::NoAdapter`], [`RenderError::NoDevice`] and [`RenderError::Level`].
+    pub fn open() -> Result<Self, RenderError> {
+        Self::open_at(GpuLevel::from_env()?)
+    }
+
+    /// [`Gpu::open`], using no more of the device than `level`.
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`] and [`RenderError::NoDevice`].
-    pub fn open() -> Result<Self, RenderError> {
-        pollster::block_on(Self::open_async())
+    pub fn open_at(level: GpuLevel) -> Result<Self, RenderError> {
+        pollster::block_on(Self::open_async(level))
     }
 
-    /// [`Gpu::open`] where nothing may block.
+    /// [`Gpu::open_at`] where nothing may block.
     ///
     /// # Errors
-    /// As for [`Gpu::open`].
-    pub async fn open_async() -> Result<Self, RenderError> {
+    /// As for [`Gpu::open_at`].
+    pub async fn open_async(wanted: GpuLevel) -> Result<Self, RenderError> {
         // OpenGL only where there is nothing better: its loaders are the talkative ones.
         let adapter = match find_adapter(wgpu::Backends::PRIMARY).await {
             Ok(adapter) => adapter,
@@ -35,17 +87,38 @@ impl Gpu {
                 find_adapter(wgpu::Backends::all()).await.map_err(|error| RenderError::NoAdapter(error.to_string()))?
             }
         };
+        let level = wanted.min(highest_level(&adapter));
+        let required_features =
+            if level == GpuLevel::Native { WIDE_KEYS & adapter.features() } else { wgpu::Features::empty() };
         // The adapter's own limits: pictures and buffers may be as large as it can. Nothing relies on more than the baseline.
-        let descriptor =
-            wgpu::DeviceDescriptor { label: Some("gigalod"), required_limits: adapter.limits(), ..Default::default() };
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("gigalod"),
+            required_limits: adapter.limits(),
+            required_features,
+            ..Default::default()
+        };
         let (device, queue) =
             adapter.request_device(&descriptor).await.map_err(|error| RenderError::NoDevice(error.to_string()))?;
-        let error = Arc::new(Mutex::new(None));
-        let keep_first = error.clone();
+        let faults = Arc::new(Mutex::new(Faults::default()));
+        let keep_first = faults.clone();
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            keep_first.lock().expect("nobody panics while holding it").get_or_insert(one_line(&error.to_string()));
+            let text = one_line(&error.to_string());
+            let fault = match error {
+                wgpu::Error::OutOfMemory { .. } => RenderError::OutOfMemory(text),
+                _ => RenderError::Device(text),
+            };
+            keep_first.lock().expect("nobody panics while holding it").first.get_or_insert(fault);
         }));
-        Ok(Self { device, queue, info: adapter.get_info(), error })
+        let keep_lost = faults.clone();
+        device.set_device_lost_callback(move |reason, text| {
+            let why = match (reason, one_line(&text)) {
+                (wgpu::DeviceLostReason::Destroyed, _) => "it was given up".into(),
+                (_, text) if text.is_empty() => "the driver does not say why".into(),
+                (_, text) => text,
+            };
+            keep_lost.lock().expect("nobody panics while holding it").lost.get_or_insert(why);
+        });
+        Ok(Self { device, queue, info: adapter.get_info(), wanted, level, faults })
     }
 
     /// Name of the adapter, and through which interface it is driven.
@@ -53,20 +126,87 @@ impl Gpu {
         format!("{} ({})", self.info.name, self.info.backend)
     }
 
+    /// What is used of the device: what was asked for, or as much of it as the device has.
+    pub fn level(&self) -> GpuLevel {
+        self.level
+    }
+
+    /// What was asked for.
+    pub(crate) fn wanted_level(&self) -> GpuLevel {
+        self.wanted
+    }
+
+    /// True where keys of 64 bits can be compared and exchanged at once.
+    pub fn has_wide_keys(&self) -> bool {
+        self.device.features().contains(WIDE_KEYS)
+    }
+
+    /// True where the host's processor does the drawing.
+    pub(crate) fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Longest edge of a picture, in pixels.
     pub fn max_picture_edge(&self) -> u32 {
         self.device.limits().max_texture_dimension_2d
     }
 
+    /// Gives the device up, with all that is on it: what a driver may do at any time. The next frame is
+    /// [`RenderError::DeviceLost`], until [`crate::Renderer::recover`].
+    pub fn close(&self) {
+        self.device.destroy();
+        let _ = self.device.poll(wgpu::PollType::Poll);
+        let mut faults = self.faults.lock().expect("nobody panics while holding it");
+        faults.lost.get_or_insert_with(|| "it was given up".into());
+    }
+
+    /// Bytes that a buffer may have, and that a pass can see of it.
+    pub(crate) fn most_buffer_bytes(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_buffer_size.min(limits.max_storage_buffer_binding_size.max(1 << 20)).min(1 << 30)
+    }
+
     /// The first error since the last call, if there was one.
     ///
     /// # Errors
-    /// [`RenderError::Device`].
+    /// [`RenderError::DeviceLost`], [`RenderError::OutOfMemory`] and [`RenderError::Device`].
     pub(crate) fn check(&self) -> Result<(), RenderError> {
-        match self.error.lock().expect("nobody panics while holding it").take() {
-            Some(error) => Err(RenderError::Device(error)),
-            None => Ok(()),
+        let mut faults = self.faults.lock().expect("nobody panics while holding it");
+        let first = faults.first.take();
+        match (&faults.lost, first) {
+            // A device may be lost for lack of memory: then that is the news, and the loss is next.
+            (Some(_), Some(fault @ RenderError::OutOfMemory(_))) => Err(fault),
+            (Some(why), _) => Err(RenderError::DeviceLost(why.clone())),
+            (None, Some(fault)) => Err(fault),
+            (None, None) => Ok(()),
         }
+    }
+
+    /// Waits until the device has done all it was given.
+    ///
+    /// # Errors
+    /// As for [`Gpu::check`].
+    pub(crate) fn wait(&self) -> Result<(), RenderError> {
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        polled.map(|_| ()).map_err(|error| RenderError::Device(error.to_string()))
+    }
+}
+
+/// What keys of 64 bits need.
+const WIDE_KEYS: wgpu::Features = wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
+
+fn highest_level(adapter: &wgpu::Adapter) -> GpuLevel {
+    let storage = wgpu::DownlevelFlags::COMPUTE_SHADERS
+        | wgpu::DownlevelFlags::FRAGMENT_WRITABLE_STORAGE
+        | wgpu::DownlevelFlags::VERTEX_STORAGE
+        | wgpu::DownlevelFlags::INDIRECT_EXECUTION;
+    // What the passes bind in one stage.
+    let enough = adapter.limits().max_storage_buffers_per_shader_stage >= 6;
+    match (adapter.get_downlevel_capabilities().flags.contains(storage) && enough, adapter.features()) {
+        (false, _) => GpuLevel::WebGl,
+        (true, features) if !features.contains(WIDE_KEYS) => GpuLevel::WebGpu,
+        (true, _) => GpuLevel::Native,
     }
 }
 

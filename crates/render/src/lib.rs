@@ -11,13 +11,15 @@ mod error;
 mod gbuffer;
 mod gpu;
 mod light;
+mod memory;
 mod readback;
 mod renderer;
 mod shader;
 mod splats;
+mod staging;
 
 pub use error::RenderError;
-pub use gpu::Gpu;
+pub use gpu::{Gpu, GpuLevel};
 pub use light::Lighting;
 pub use renderer::{Frame, Look, Picture, Renderer};
 pub use splats::Kernel;

@@ -1,8 +1,9 @@
 //! The lighting pass: G-buffer to picture. Shader: `shader/light.wgsl`.
 
 use crate::gbuffer::{self, GBuffer};
-use crate::shader;
-use crate::splats::{buffer_with, four};
+use crate::memory::Pool;
+use crate::shader::{self, Target};
+use crate::splats::params::four;
 use gigalod_geom::Camera;
 use gigalod_geom::color::LINEAR_OF_SRGB8;
 use glam::DVec3;
@@ -33,7 +34,7 @@ impl Default for Lighting {
 /// Inputs of the lighting pass. WGSL twin: `shader/light_params.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
-struct LightParams {
+pub(crate) struct LightParams {
     /// View axes, in world axes.
     right: [f32; 4],
     up: [f32; 4],
@@ -58,7 +59,7 @@ pub(crate) struct LightPass {
 
 impl LightPass {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
-        let module = shader::module(device, "light.wgsl", SOURCE);
+        let module = shader::module(device, "light.wgsl", SOURCE, Target::None);
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::FRAGMENT,
@@ -115,20 +116,14 @@ impl LightPass {
         Self { pipeline, layout }
     }
 
-    /// Binds a G-buffer and a way of lighting it.
-    pub(crate) fn bind(
-        &self,
-        device: &wgpu::Device,
-        gbuffer: &GBuffer,
-        camera: &Camera,
-        lighting: &Lighting,
-    ) -> wgpu::BindGroup {
+    /// What its uniform buffer holds.
+    pub(crate) fn params(camera: &Camera, lighting: &Lighting) -> LightParams {
         let linear = |srgb: [u8; 3]| {
             let [r, g, b] = srgb.map(|value| LINEAR_OF_SRGB8[usize::from(value)]);
             [r, g, b, 1.0]
         };
         let towards = lighting.towards_light.and_then(|light| light.try_normalize());
-        let params = LightParams {
+        LightParams {
             right: four(camera.right),
             up: four(camera.up),
             forward: four(camera.forward),
@@ -138,15 +133,18 @@ impl LightPass {
             size_px: [camera.size.width as f32, camera.size.height as f32],
             focal_px: camera.focal_px() as f32,
             ambient: AMBIENT,
-        };
-        let uniform = buffer_with(device, "light params", wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(&params));
+        }
+    }
+
+    /// Binds a G-buffer and a way of lighting it.
+    pub(crate) fn bind(&self, device: &wgpu::Device, gbuffer: &GBuffer, params: &Pool) -> wgpu::BindGroup {
         let [albedo, normal] = [&gbuffer.albedo, &gbuffer.normal].map(gbuffer::view);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("light"),
             layout: &self.layout,
             entries: &[
-                entry(0, uniform.as_entire_binding()),
+                entry(0, params.binding()),
                 entry(1, wgpu::BindingResource::TextureView(&albedo)),
                 entry(2, wgpu::BindingResource::TextureView(&normal)),
             ],

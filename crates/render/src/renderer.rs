@@ -1,12 +1,22 @@
 //! One picture: everything a scene draws, lit.
+//!
+//! Takes frames; leaves pictures on the device, or brings them to the host. What always holds: all that is kept on the device
+//! is within the budget; a frame like the last one creates no buffer and no texture; after any error the renderer can be used
+//! again, at the latest after [`Renderer::recover`].
 
 use crate::gbuffer::{self, GBuffer};
-use crate::light::{LightPass, PICTURE};
-use crate::readback::read_texture;
-use crate::splats::{Kernel, SplatBatch, SplatPass};
-use crate::{Gpu, Lighting, RenderError};
+use crate::light::{LightParams, LightPass, PICTURE};
+use crate::memory::{self, Pool};
+use crate::readback::{self, read_texture};
+use crate::splats::Kernel;
+use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
+use crate::splats::keyed::{self, Bands, KeyedBuffers, KeyedFrame, KeyedPass};
+use crate::splats::params::STRIDE;
+use crate::splats::store::{self, Chunk, Plan};
+use crate::staging::Staging;
+use crate::{Gpu, GpuLevel, Lighting, RenderError};
 use gigalod_geom::{Camera, ImageSize};
-use gigalod_runtime::{DrawSource, Similarity, SplatBall};
+use gigalod_runtime::{DrawSource, Similarity, SplatList};
 
 /// How things are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,25 +51,73 @@ pub struct Picture {
     pub footprint_px: Vec<f32>,
 }
 
-/// Draws frames; keeps pipelines and targets between them.
+/// Draws frames; keeps pipelines, targets and buffers between them.
 #[derive(Debug)]
 pub struct Renderer {
     gpu: Gpu,
-    splat_pass: SplatPass,
+    keyed_pass: KeyedPass,
+    depth_test_pass: DepthTestPass,
     light_pass: LightPass,
-    gbuffer: Option<(GBuffer, wgpu::Texture)>,
-    gpu_bytes: u64,
+    budget: Option<u64>,
+    compute_extent_px: u32,
+    targets: Option<Targets>,
+    staging: Staging,
+    uploaded_bytes: u64,
+    buffers: Buffers,
+    last: Option<OnDevice>,
 }
 
+/// A frame that lies on the device, ready to be drawn.
+#[derive(Debug)]
+struct OnDevice {
+    kernel: Kernel,
+    bands: Bands,
+    plan: Plan,
+}
+
+/// What a picture of one size is drawn into.
+#[derive(Debug)]
+struct Targets {
+    gbuffer: GBuffer,
+    picture: wgpu::Texture,
+}
+
+/// Buffers that are kept.
+#[derive(Debug)]
+struct Buffers {
+    chunks: Vec<Chunk>,
+    keyed: KeyedBuffers,
+    passes: Pool,
+    parts: Pool,
+    light: Pool,
+    readback: Pool,
+}
+
+/// Parts that [`Renderer::most_splats`] leaves room for.
+const USUAL_PARTS: u64 = 256;
+
 impl Renderer {
-    /// Compiles all passes.
+    /// Compiles what every frame needs. Passes of a kernel are compiled when it is first drawn.
     ///
     /// # Errors
-    /// [`RenderError::Device`].
+    /// [`RenderError::Device`], [`RenderError::OutOfMemory`] and [`RenderError::DeviceLost`].
     pub fn new(gpu: Gpu) -> Result<Self, RenderError> {
-        let (splat_pass, light_pass) = (SplatPass::new(&gpu.device), LightPass::new(&gpu.device));
+        let light_pass = LightPass::new(&gpu.device);
+        let staging = Staging::new(&gpu);
         gpu.check()?;
-        Ok(Self { gpu, splat_pass, light_pass, gbuffer: None, gpu_bytes: 0 })
+        Ok(Self {
+            gpu,
+            keyed_pass: KeyedPass::default(),
+            depth_test_pass: DepthTestPass::default(),
+            light_pass,
+            budget: None,
+            compute_extent_px: keyed::COMPUTE_EXTENT_PX,
+            targets: None,
+            staging,
+            uploaded_bytes: 0,
+            buffers: Buffers::new(),
+            last: None,
+        })
     }
 
     /// The device it draws with.
@@ -67,121 +125,310 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Bytes that the last frame took on the device.
+    /// Bytes that are taken on the device: targets, and all buffers that are kept.
     pub fn gpu_bytes(&self) -> u64 {
-        self.gpu_bytes
+        let targets = self.targets.as_ref().map_or(0, |targets| targets_bytes(targets.gbuffer.size));
+        Staging::BYTES + targets + self.buffers.all().map(Pool::bytes).sum::<u64>()
     }
 
-    /// Draws a frame and waits for it.
+    /// Bytes that the last frame sent to the device.
+    pub fn uploaded_bytes(&self) -> u64 {
+        self.uploaded_bytes
+    }
+
+    /// Most bytes to take on the device from now on; `None` for no limit. What is kept beyond that is freed by the next frame.
+    pub fn set_budget(&mut self, bytes: Option<u64>) {
+        self.budget = bytes;
+    }
+
+    /// How many splats can be drawn into a picture of this size within the budget, and read back. 0 where there is no room for
+    /// the picture itself.
+    pub fn most_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
+        const NAMES: u64 = u32::MAX as u64 - 1;
+        let Some(budget) = self.budget else { return NAMES };
+        let room = budget.saturating_sub(self.bytes_without_splats(size, kernel));
+        // Whole rows of textures; of several chunks all but the last are full, and the list has room for one.
+        let listed = if self.gpu.level() > GpuLevel::WebGl { store::WIDTH * keyed::LISTED_BYTES } else { 0 };
+        let in_first = store::most_in_chunk(&self.gpu) / store::WIDTH;
+        let rows = match room / (store::ROW_BYTES + listed) {
+            rows if rows <= in_first => rows,
+            _ => (room - in_first * listed) / store::ROW_BYTES,
+        };
+        (rows * store::WIDTH).min(NAMES)
+    }
+
+    /// Splats of at most this many pixels across and down are drawn by the compute pass, larger ones through the pipeline: 0 for
+    /// none, 60 is the most. That decides how long a frame takes, never what it shows.
+    pub fn set_compute_extent(&mut self, extent_px: u32) {
+        self.compute_extent_px = extent_px.min(keyed::MOST_COMPUTE_EXTENT_PX);
+    }
+
+    /// Opens the device anew and forgets the old one: what to do about [`RenderError::DeviceLost`]. The next frame fills the new
+    /// one. Budget and settings stay.
     ///
     /// # Errors
-    /// [`RenderError::Size`], [`RenderError::Device`] and [`RenderError::ForeignDrawSource`].
-    pub fn picture(&mut self, frame: &Frame<'_>) -> Result<Picture, RenderError> {
-        let size = frame.camera.size;
-        let limit = self.gpu.max_picture_edge();
-        if size.width.min(size.height) == 0 || size.width.max(size.height) > limit {
-            return Err(RenderError::Size { width: size.width, height: size.height, limit });
-        }
-        if self.gbuffer.as_ref().is_none_or(|(gbuffer, _)| gbuffer.size != size) {
-            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
-            let picture = gbuffer::create_texture(&self.gpu.device, "picture", size, PICTURE, usage);
-            self.gbuffer = Some((GBuffer::new(&self.gpu.device, size), picture));
-        }
-        let (gbuffer, picture) = self.gbuffer.as_ref().expect("made above where it was missing");
-        let device = &self.gpu.device;
-        let near = near_plane(frame);
-        let mut batches: Vec<SplatBatch> = Vec::new();
-        for (placement, source) in &frame.draws {
-            match source {
-                DrawSource::Splats(splats) => batches.extend(self.splat_pass.upload(
-                    device,
-                    &frame.camera,
-                    placement,
-                    frame.look.kernel,
-                    near,
-                    splats,
-                )),
-                _ => return Err(RenderError::ForeignDrawSource),
-            }
-        }
-        self.gpu_bytes =
-            gbuffer.bytes() + size.pixels() as u64 * 4 + batches.iter().map(SplatBatch::bytes).sum::<u64>();
+    /// As for [`Gpu::open`] and [`Renderer::new`]; then it is still the old one.
+    pub fn recover(&mut self) -> Result<(), RenderError> {
+        let fresh = Self::new(Gpu::open_at(self.gpu.wanted_level())?)?;
+        *self = Self { budget: self.budget, compute_extent_px: self.compute_extent_px, ..fresh };
+        Ok(())
+    }
 
-        let lit = self.light_pass.bind(device, gbuffer, &frame.camera, &frame.look.lighting);
-        let mut encoder = device.create_command_encoder(&Default::default());
-        let [albedo, normal, depth, depth_test, target] =
-            [&gbuffer.albedo, &gbuffer.normal, &gbuffer.depth, &gbuffer.depth_test, picture].map(gbuffer::view);
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("G-buffer"),
-                color_attachments: &[
-                    Some(cleared(&albedo, wgpu::Color::TRANSPARENT)),
-                    Some(cleared(&normal, wgpu::Color::TRANSPARENT)),
-                    Some(cleared(&depth, gbuffer::NO_DEPTH)),
-                ],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &depth_test,
-                    depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
-                    stencil_ops: None,
-                }),
-                ..Default::default()
-            });
-            for batch in &batches {
-                self.splat_pass.draw(&mut pass, batch);
-            }
-        }
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("light"),
-                color_attachments: &[Some(cleared(&target, wgpu::Color::TRANSPARENT))],
-                ..Default::default()
-            });
-            self.light_pass.draw(&mut pass, &lit);
-        }
-        self.gpu.queue.submit([encoder.finish()]);
+    /// Draws a frame and waits until the device is done. The picture stays there.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`], [`RenderError::TooMany`] and
+    /// [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
+    /// [`RenderError::DeviceLost`]: [`Renderer::recover`].
+    pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), RenderError> {
+        self.submit(frame, false)?;
+        self.survive(self.gpu.wait())
+    }
+
+    /// Draws the last frame once more from what lies on the device, without sending anything: for a window that was covered, or
+    /// a bench. False where there is no last frame, as after an error.
+    ///
+    /// # Errors
+    /// As for [`Renderer::draw`].
+    pub fn redraw(&mut self) -> Result<bool, RenderError> {
         self.gpu.check()?;
+        if self.last.is_none() {
+            return Ok(false);
+        }
+        let drawn = self.submit_last().and_then(|()| self.gpu.wait());
+        self.survive(drawn).map(|()| true)
+    }
 
-        let rgba = read_texture(&self.gpu, picture, 4)?;
-        let depth = read_texture(&self.gpu, &gbuffer.depth, 4)?;
-        let normal = read_texture(&self.gpu, &gbuffer.normal, 8)?;
+    /// [`Renderer::draw`], and brings the picture to the host.
+    ///
+    /// # Errors
+    /// As for [`Renderer::draw`].
+    pub fn picture(&mut self, frame: &Frame<'_>) -> Result<Picture, RenderError> {
+        self.submit(frame, true)?;
+        let read = self.read();
+        self.survive(read)
+    }
+
+    fn read(&self) -> Result<Picture, RenderError> {
+        let targets = self.targets.as_ref().expect("a frame was submitted");
+        let through = &self.buffers.readback;
+        let rgba = read_texture(&self.gpu, &targets.picture, 4, through)?;
+        let depth = read_texture(&self.gpu, &targets.gbuffer.depth, 4, through)?;
+        let normal = read_texture(&self.gpu, &targets.gbuffer.normal, 8, through)?;
         Ok(Picture {
-            size,
+            size: targets.gbuffer.size,
             rgba,
             depth: depth.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(),
             footprint_px: normal.as_chunks::<8>().0.iter().map(|pixel| f32_of_f16([pixel[6], pixel[7]])).collect(),
         })
     }
-}
 
-fn cleared(view: &wgpu::TextureView, color: wgpu::Color) -> wgpu::RenderPassColorAttachment<'_> {
-    wgpu::RenderPassColorAttachment {
-        view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(color), store: wgpu::StoreOp::Store },
-    }
-}
-
-/// How close to the eye something may come before it counts as being there: about a 2²⁰th of the distance to the farthest
-/// thing drawn. The depth buffer has the same precision whatever this is; and as it is a power of two, depths round the same
-/// way whatever it is, so what else is drawn makes no difference to a pixel.
-fn near_plane(frame: &Frame<'_>) -> f64 {
-    let farthest = frame.draws.iter().map(|(placement, source)| match source {
-        DrawSource::Splats(splats) => {
-            let squared = |ball: &SplatBall| glam::Vec3::from_array(ball.center_in_eye).length_squared();
-            f64::from(splats.iter().map(|(ball, _)| squared(ball)).fold(0.0, f32::max)).sqrt() * placement.scale
+    /// Checks a frame, makes room, uploads, and hands it to the device.
+    fn submit(&mut self, frame: &Frame<'_>, read_back: bool) -> Result<(), RenderError> {
+        self.gpu.check()?;
+        let (size, kernel) = (frame.camera.size, frame.look.kernel);
+        let limit = self.gpu.max_picture_edge();
+        if size.width.min(size.height) == 0 || size.width.max(size.height) > limit {
+            return Err(RenderError::Size { width: size.width, height: size.height, limit });
         }
-        _ => 0.0,
-    });
-    match farthest.fold(0.0, f64::max) {
-        0.0 => 1.0,
-        farthest => power_of_two_below(farthest) / f64::from(1 << 20),
+        if self.gpu.level() == GpuLevel::WebGl && kernel.is_gauss() {
+            return Err(RenderError::CannotBlend);
+        }
+        let lists = frame.draws.iter().map(|(placement, source)| match source {
+            DrawSource::Splats(splats) => Ok((*placement, splats)),
+            _ => Err(RenderError::ForeignDrawSource),
+        });
+        let lists = lists.collect::<Result<Vec<_>, _>>()?;
+        let splats = lists.iter().map(|(_, list)| list.len() as u64).sum::<u64>();
+        if splats >= u64::from(u32::MAX) {
+            return Err(RenderError::TooMany(splats));
+        }
+        self.last = None;
+        let drawn = self.send(frame, &lists, read_back).and_then(|()| self.submit_last());
+        self.survive(drawn)
+    }
+
+    /// Makes room and uploads.
+    fn send(
+        &mut self,
+        frame: &Frame<'_>,
+        lists: &[(Similarity, &SplatList)],
+        read_back: bool,
+    ) -> Result<(), RenderError> {
+        let (camera, kernel) = (&frame.camera, frame.look.kernel);
+        let most = store::most_in_chunk(&self.gpu);
+        let plan = Plan::new(camera, lists, most);
+        let bands = self.bands(camera.size, kernel);
+        let keyed = self.gpu.level() > GpuLevel::WebGl;
+        let passes = if keyed {
+            keyed::pass_bytes(&self.gpu, camera, kernel, &bands, &plan, self.compute_extent_px, read_back)
+        } else {
+            depth_test::pass_bytes(camera)
+        };
+        self.make_room(camera.size, kernel, &plan, passes.len() as u64, read_back)?;
+        let Self { gpu, staging, buffers, uploaded_bytes, .. } = self;
+        store::upload(gpu, staging, &buffers.chunks, most, lists)?;
+        staging.write(gpu, buffers.passes.buffer(), 0, &passes)?;
+        staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&plan.parts))?;
+        let light = LightPass::params(camera, &frame.look.lighting);
+        staging.write(gpu, buffers.light.buffer(), 0, bytemuck::bytes_of(&light))?;
+        staging.finish(gpu)?;
+        *uploaded_bytes = staging.take_written_bytes();
+        self.last = Some(OnDevice { kernel, bands, plan });
+        Ok(())
+    }
+
+    /// Hands what lies on the device to the device.
+    fn submit_last(&mut self) -> Result<(), RenderError> {
+        let Self { gpu, buffers, targets, .. } = self;
+        let OnDevice { kernel, bands, plan } = self.last.as_ref().expect("just sent, or asked for");
+        let Targets { gbuffer, picture } = targets.as_ref().expect("made with the room");
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let chunks = &buffers.chunks[..plan.chunks.len()];
+        let (kernel, passes, parts) = (*kernel, &buffers.passes, &buffers.parts);
+        if chunks.is_empty() {
+            drop(gbuffer.begin(&mut encoder, true));
+        } else if gpu.level() > GpuLevel::WebGl {
+            self.keyed_pass.prepare(gpu, kernel, plan);
+            let keyed = KeyedFrame { kernel, bands: *bands, plan, chunks, passes, parts, buffers: &buffers.keyed };
+            self.keyed_pass.encode(gpu, &mut encoder, gbuffer, &keyed);
+        } else {
+            self.depth_test_pass.prepare(gpu, kernel);
+            let splats = DepthTestFrame { kernel, plan, chunks, passes, parts };
+            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, &splats);
+        }
+        let lit = self.light_pass.bind(&gpu.device, gbuffer, &buffers.light);
+        {
+            let target = gbuffer::view(picture);
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("light"),
+                color_attachments: &[Some(gbuffer::attachment(&target, true, wgpu::Color::TRANSPARENT))],
+                ..Default::default()
+            });
+            self.light_pass.draw(&mut pass, &lit);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        gpu.check()
+    }
+
+    /// How a picture is cut up: what is kept for each of its pixels shall fit into a binding, and leave room for splats.
+    fn bands(&self, size: ImageSize, kernel: Kernel) -> Bands {
+        const LEAST_BYTES: u64 = 1 << 20;
+        let share = self.budget.map_or(u64::MAX, |budget| (budget / 8).max(LEAST_BYTES));
+        Bands::new(size, kernel, self.gpu.most_buffer_bytes().min(share))
+    }
+
+    /// What a frame without a splat takes.
+    fn bytes_without_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
+        let mut buffers = Buffers::new();
+        let bands = self.bands(size, kernel);
+        if self.gpu.level() > GpuLevel::WebGl {
+            buffers.keyed.want(&bands, kernel, 0);
+        }
+        buffers.want(size, STRIDE * USUAL_PARTS, USUAL_PARTS, true);
+        Staging::BYTES + targets_bytes(size) + buffers.all().map(Pool::least_bytes).sum::<u64>()
+    }
+
+    /// Targets of this size, and buffers for a frame; within the budget, or with an error and nothing changed.
+    fn make_room(
+        &mut self,
+        size: ImageSize,
+        kernel: Kernel,
+        plan: &Plan,
+        pass_bytes: u64,
+        read_back: bool,
+    ) -> Result<(), RenderError> {
+        let bands = self.bands(size, kernel);
+        let keyed = self.gpu.level() > GpuLevel::WebGl;
+        let buffers = &mut self.buffers;
+        buffers.all_mut().iter_mut().for_each(|pool| pool.wanted = 0);
+        if buffers.chunks.len() < plan.chunks.len() {
+            buffers.chunks.resize_with(plan.chunks.len(), Chunk::new);
+        }
+        for (chunk, (parts, splats)) in buffers.chunks.iter_mut().zip(&plan.chunks) {
+            chunk.parts = parts.clone();
+            chunk.want(*splats);
+        }
+        if keyed {
+            buffers.keyed.want(&bands, kernel, plan.chunks.iter().map(|(_, splats)| *splats).max().unwrap_or(0));
+        }
+        buffers.want(size, pass_bytes, plan.parts.len() as u64, read_back);
+        let other = Staging::BYTES + targets_bytes(size);
+        let stale = self.targets.take_if(|targets| targets.gbuffer.size != size);
+        if let Some(targets) = stale {
+            targets.gbuffer.free();
+            targets.picture.destroy();
+        }
+        memory::fit(&self.gpu, &mut self.buffers.all_mut(), other, self.budget)?;
+        if self.targets.is_none() {
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+            let picture = gbuffer::create_texture(&self.gpu.device, "picture", size, PICTURE, usage);
+            self.targets = Some(Targets { gbuffer: GBuffer::new(&self.gpu.device, size), picture });
+            self.gpu.check()?;
+        }
+        Ok(())
+    }
+
+    /// After [`RenderError::OutOfMemory`] frees all that was kept, so that a coarser frame finds room.
+    fn survive<T>(&mut self, result: Result<T, RenderError>) -> Result<T, RenderError> {
+        if result.is_err() {
+            self.last = None;
+        }
+        if let Err(RenderError::OutOfMemory(_)) = &result {
+            self.buffers.all_mut().into_iter().for_each(Pool::free);
+            self.buffers.chunks.clear();
+            if let Some(targets) = self.targets.take() {
+                targets.gbuffer.free();
+                targets.picture.destroy();
+            }
+            // What came after the first error is its consequence; a lost device says so again.
+            let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+            let _ = self.gpu.check();
+        }
+        result
     }
 }
 
-fn power_of_two_below(value: f64) -> f64 {
-    const EXPONENT: u64 = 0x7ff << 52;
-    f64::from_bits(value.to_bits() & EXPONENT)
+impl Buffers {
+    fn new() -> Self {
+        use wgpu::BufferUsages as Usage;
+        Self {
+            chunks: Vec::new(),
+            keyed: KeyedBuffers::new(),
+            passes: Pool::new("passes", Usage::UNIFORM | Usage::COPY_SRC),
+            parts: Pool::new("parts", Usage::UNIFORM | Usage::STORAGE),
+            light: Pool::new("light", Usage::UNIFORM),
+            readback: Pool::new("readback", Usage::MAP_READ),
+        }
+    }
+
+    /// Asks for room for all but splats and keys.
+    fn want(&mut self, size: ImageSize, pass_bytes: u64, parts: u64, read_back: bool) {
+        self.passes.wanted = pass_bytes;
+        self.parts.wanted = parts.max(1) * STRIDE;
+        self.light.wanted = size_of::<LightParams>() as u64;
+        self.readback.wanted = if read_back { readback::buffer_bytes(size) } else { 0 };
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Pool> {
+        let KeyedBuffers { keys, sums, list, draw } = &self.keyed;
+        let chunks = self.chunks.iter().flat_map(|chunk| [&chunk.balls, &chunk.normal_colors]);
+        [keys, sums, list, draw, &self.passes, &self.parts, &self.light, &self.readback].into_iter().chain(chunks)
+    }
+
+    fn all_mut(&mut self) -> Vec<&mut Pool> {
+        let KeyedBuffers { keys, sums, list, draw } = &mut self.keyed;
+        let chunks = self.chunks.iter_mut().flat_map(|chunk| [&mut chunk.balls, &mut chunk.normal_colors]);
+        [keys, sums, list, draw, &mut self.passes, &mut self.parts, &mut self.light, &mut self.readback]
+            .into_iter()
+            .chain(chunks)
+            .collect()
+    }
+}
+
+fn targets_bytes(size: ImageSize) -> u64 {
+    // The G-buffer and the picture.
+    GBuffer::bytes(size) + size.pixels() as u64 * 4
 }
 
 /// IEEE 754 half to single precision; finite and positive numbers are all that is stored here.

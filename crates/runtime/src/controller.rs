@@ -24,6 +24,10 @@ const REST_STEP: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Splats grow with the threshold's minus second power on a surface, as long as the data go on.
 const SPLATS_EXPONENT: f64 = 2.0;
 
+/// Threshold from which on coarser is not faster, in pixels: fewer splats, but as many pixels that they cover. The coarsest of the
+/// splats paper's figure 1 are 15.
+const COARSEST_PX: f32 = 16.0;
+
 /// Threshold to begin with, in pixels: fast anywhere, and still a picture.
 const FIRST_PX: f32 = 8.0;
 
@@ -40,6 +44,8 @@ pub struct FrameRate {
     moving_px: f32,
     /// Threshold that the last frame was to have; while the camera moves, the one that it had.
     asked_px: f32,
+    /// Splats of the last view at the coarsest threshold there is.
+    coarsest_splats: u64,
     resting: bool,
     /// The last frame showed all there is at the finest threshold.
     settled: bool,
@@ -55,6 +61,7 @@ impl FrameRate {
             cost: CostModel::default(),
             moving_px: first_px,
             asked_px: first_px,
+            coarsest_splats: 1,
             resting: false,
             settled: false,
         }
@@ -65,23 +72,25 @@ impl FrameRate {
         self.resting = !moved;
         if self.resting {
             self.asked_px = (self.asked_px * REST_STEP).max(self.finest_px);
-            return Fineness { threshold_px: self.asked_px, most_splats: u64::MAX };
+            return Fineness::px(self.asked_px);
         }
         let affordable = self.cost.splats_within(self.target_ms);
         let most_splats = affordable.map_or(FIRST_SPLATS, |splats| (splats * CUT_BOUND) as u64);
-        Fineness { threshold_px: self.moving_px, most_splats: most_splats.max(1) }
+        Fineness { threshold_px: self.moving_px, most_splats: most_splats.max(self.coarsest_splats) }
     }
 
-    /// Takes note of a frame: how long it took from beginning to end, the threshold it was really cut at, what it drew, and
-    /// whether finer pages are on their way.
-    pub fn drew(&mut self, frame_ms: f64, threshold_px: f32, report: &CutReport, loading: bool) {
+    /// Takes note of a frame: how long it took from beginning to end, what it drew, and whether finer pages are on their way.
+    pub fn drew(&mut self, frame_ms: f64, report: &CutReport, loading: bool) {
         self.cost.learn(report.drawn as f64, frame_ms);
         // Where a budget does not allow the finest, this is as fine as it gets.
         self.settled = self.resting && self.asked_px <= self.finest_px && !loading;
         if self.resting {
             return;
         }
-        (self.moving_px, self.asked_px) = (threshold_px, threshold_px);
+        let coarsest_px = self.finest_px.max(COARSEST_PX);
+        let splats_at = |px: f32| report.drawn as f64 * f64::from(report.threshold_px / px).powf(SPLATS_EXPONENT);
+        self.coarsest_splats = (splats_at(coarsest_px) as u64).max(1);
+        (self.moving_px, self.asked_px) = (report.threshold_px, report.threshold_px);
         let Some(affordable) = self.cost.splats_within(self.target_ms) else { return };
         if (frame_ms / self.target_ms - 1.0).abs() <= DEAD_BAND {
             return;
@@ -89,7 +98,7 @@ impl FrameRate {
         let surplus = report.drawn.max(1) as f64 / affordable.max(1.0);
         // A step is at most an octave: beyond that the count says little.
         let step = surplus.powf(1.0 / SPLATS_EXPONENT).clamp(0.5, 2.0);
-        self.moving_px = (threshold_px * step as f32).max(self.finest_px);
+        self.moving_px = (report.threshold_px * step as f32).clamp(self.finest_px, coarsest_px);
     }
 
     /// True when drawing again would draw the same.
@@ -186,21 +195,22 @@ mod tests {
             self.frames += 1;
             let noise = 1.0 + self.noise * f64::from(self.frames).sin();
             let ms = (self.fixed_ms + self.splat_ms * splats(px)) * noise;
-            control.drew(ms, px, &CutReport { drawn: splats(px) as u64, ..CutReport::default() }, false);
+            let report = CutReport { drawn: splats(px) as u64, threshold_px: px, ..CutReport::default() };
+            control.drew(ms, &report, false);
             (ms, px)
         }
     }
 
     #[test]
     fn it_holds_the_target_on_any_machine_and_through_a_sudden_turn() {
-        for (fixed_ms, splat_ms) in [(2.0, 1e-4), (30.0, 1e-4), (5.0, 1e-3), (60.0, 2e-5)] {
+        for (fixed_ms, splat_ms) in [(2.0, 1e-4), (30.0, 1e-4), (5.0, 4e-4), (60.0, 2e-5)] {
             let mut machine = Machine { fixed_ms, splat_ms, noise: 0.03, frames: 0 };
             let mut control = FrameRate::new(100.0, 0.01);
             let mut late = 0;
             for frame in 0..300 {
                 // Detail grows and shrinks slowly; from frame 150 on there is twenty times as much of it.
                 let turn = if frame < 150 { 1.0 } else { 20.0 };
-                let detail = 3e6 * turn * (1.0 + 0.5 * (f64::from(frame) * 0.05).sin());
+                let detail = 2e6 * turn * (1.0 + 0.5 * (f64::from(frame) * 0.05).sin());
                 let (ms, _) = machine.draw(&mut control, detail, true);
                 let settled = frame > 20 && !(150..153).contains(&frame);
                 assert!(!settled || (80.0..120.0).contains(&ms), "{ms} ms in frame {frame} of {fixed_ms} + {splat_ms}");
@@ -233,11 +243,25 @@ mod tests {
     }
 
     #[test]
+    fn a_machine_that_is_too_slow_is_not_given_ever_larger_splats() {
+        let mut machine = Machine { fixed_ms: 300.0, splat_ms: 1e-3, noise: 0.1, frames: 0 };
+        let mut control = FrameRate::new(100.0, 1.0);
+        for frame in 0..50 {
+            let (_, px) = machine.draw(&mut control, 1e7, true);
+            // The first frames know nothing of the view.
+            assert!(px <= COARSEST_PX * 1.03 || frame < 3, "{px} in frame {frame}");
+        }
+        machine.fixed_ms = 10.0;
+        let ms = (0..20).map(|_| machine.draw(&mut control, 1e7, true).0).last().unwrap();
+        assert!((80.0..120.0).contains(&ms), "{ms}: a faster one recovers");
+    }
+
+    #[test]
     fn what_is_still_being_loaded_is_waited_for() {
         let mut control = FrameRate::new(50.0, 1.0);
         for loading in [true, false] {
             (0..20).for_each(|_| assert!(control.next(false).threshold_px >= 1.0));
-            control.drew(10.0, 1.0, &CutReport::default(), loading);
+            control.drew(10.0, &CutReport::default(), loading);
             assert_eq!(control.is_settled(), !loading);
         }
     }

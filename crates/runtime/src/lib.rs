@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 pub mod controller;
+pub mod fineness;
 pub mod report;
 pub mod residency;
 pub mod scene;
@@ -19,9 +20,10 @@ pub mod splats;
 pub mod view;
 
 pub use controller::FrameRate;
+pub use fineness::{Fineness, Interrupt};
 pub use report::{CutReport, Limit};
 pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};
-pub use scene::{Fineness, Instance, Scene};
-pub use selection::{DeviceDraw, DrawSource, RequestRing, SelectInput, Selection, Selector, Target};
+pub use scene::{Instance, Scene};
+pub use selection::{DeviceDraw, DrawSource, Outcome, RequestRing, SelectInput, Selection, Selector, Target};
 pub use splats::{SplatBall, SplatList, SplatSelector};
 pub use view::{InstanceId, ModelView, Similarity, ViewId};

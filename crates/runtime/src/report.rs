@@ -33,9 +33,11 @@ pub struct CutReport {
     pub culled_backface: u64,
     /// Nodes looked at.
     pub visited: u64,
+    /// The threshold of the cut, in pixels: what was asked for, or more where a budget raised it.
+    pub threshold_px: f32,
     /// Largest projected error of what is drawn, in pixels.
     pub max_error_px: f32,
-    /// Set where that is above the threshold.
+    /// Set where that is above the threshold that was asked for.
     pub limited_by: Option<Limit>,
     /// The file contradicts itself: the traversal was cut short, and something may be missing.
     pub inconsistent: bool,
@@ -56,6 +58,7 @@ impl CutReport {
             culled_frustum: self.culled_frustum + other.culled_frustum,
             culled_backface: self.culled_backface + other.culled_backface,
             visited: self.visited + other.visited,
+            threshold_px: self.threshold_px.max(other.threshold_px),
             max_error_px: self.max_error_px.max(other.max_error_px),
             limited_by: self.limited_by.max(other.limited_by),
             inconsistent: self.inconsistent || other.inconsistent,

@@ -2,7 +2,7 @@
 
 use crate::residency::{FileId, PageRequest, Residency};
 use crate::splats::SplatList;
-use crate::{CutReport, InstanceId, ModelView, ViewId};
+use crate::{CutReport, InstanceId, Interrupt, ModelView, ViewId};
 use std::collections::VecDeque;
 
 /// What selector state is keyed by: one instance in one view.
@@ -23,6 +23,12 @@ pub struct SelectInput<'a> {
     pub view: ModelView,
     /// Largest error on screen that is wanted, in pixels; 0 for everything there is.
     pub threshold_px: f32,
+    /// With more splats than these the cut is broken off.
+    pub most_splats: u64,
+    /// Bytes that may be allocated for the list; where they are not enough, the cut is broken off.
+    pub room_bytes: u64,
+    /// Breaks the cut off.
+    pub interrupt: &'a Interrupt,
     /// What can be drawn now.
     pub residency: &'a Residency,
 }
@@ -61,10 +67,45 @@ pub struct Selection {
     pub report: CutReport,
 }
 
+impl Selection {
+    /// Bytes that it keeps on the host.
+    pub fn bytes(&self) -> u64 {
+        let list = match &self.draw {
+            DrawSource::Splats(list) => list.bytes(),
+            DrawSource::OnDevice(_) => 0,
+        };
+        list + (self.requests.capacity() * size_of::<PageRequest>()) as u64
+    }
+
+    /// The list on the host; an empty one takes the place of one on the device.
+    pub(crate) fn splats_mut(&mut self) -> &mut SplatList {
+        if !matches!(self.draw, DrawSource::Splats(_)) {
+            self.draw = DrawSource::default();
+        }
+        match &mut self.draw {
+            DrawSource::Splats(list) => list,
+            DrawSource::OnDevice(_) => unreachable!("replaced above"),
+        }
+    }
+}
+
+/// How a cut ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It is there.
+    Complete,
+    /// It was broken off; what it left is of no use.
+    Interrupted,
+    /// It has more splats than were allowed; what it left is of no use.
+    TooMany,
+    /// Its list needs more memory than was allowed; what it left is of no use.
+    NoRoom,
+}
+
 /// Turns (hierarchy, instance, view, residency) into a draw source and page requests.
 pub trait Selector {
     /// Overwrites `out`. State from earlier calls for the same `target` may be used, never that of another target.
-    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection);
+    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) -> Outcome;
 
     /// Drops the state of a target that is gone.
     fn forget(&mut self, target: Target);

@@ -5,8 +5,11 @@ mod common;
 use common::{camera, open, scene, statue, statue_bytes};
 use gigalod_format::splats::page::CODEC_RAW;
 use gigalod_format::splats::{PageContents, PageId, PageRecord, Skeleton, SplatFile, WordIndex};
-use gigalod_runtime::splats::{Culled, CutSink, Cutting, VisitedNode, Work, cut};
-use gigalod_runtime::{CutReport, FileId, Limit, ModelView, Scene, SelectInput, Similarity, ViewId};
+use gigalod_runtime::splats::Cutting;
+use gigalod_runtime::splats::plain::{Culled, CutSink, VisitedNode, Work, cut};
+use gigalod_runtime::{
+    CutReport, FileId, Fineness, Interrupt, Limit, ModelView, Scene, SelectInput, Similarity, ViewId,
+};
 use std::collections::BTreeMap;
 
 /// Where a node is stored.
@@ -35,7 +38,10 @@ impl CutSink for Record {
 
 fn record(scene: &Scene, azimuth: f64, zoom: f64, threshold_px: f32, cutting: Cutting) -> (CutReport, Record) {
     let view = ModelView::new(&camera(scene, azimuth, zoom), &Similarity::IDENTITY);
-    let input = SelectInput { file: FileId(0), view, threshold_px, residency: scene.residency() };
+    let interrupt = Interrupt::default();
+    let residency = scene.residency();
+    let (file, most_splats, room_bytes) = (FileId(0), u64::MAX, u64::MAX);
+    let input = SelectInput { file, view, threshold_px, most_splats, room_bytes, interrupt: &interrupt, residency };
     let mut record = Record::default();
     let report = cut(&input, &cutting, &mut Work::default(), &mut record);
     (report, record)
@@ -44,11 +50,11 @@ fn record(scene: &Scene, azimuth: f64, zoom: f64, threshold_px: f32, cutting: Cu
 fn everything_resident() -> Scene {
     let mut scene = scene(statue(), 1 << 30);
     let camera = camera(&scene, 0.0, 0.3);
-    scene.select_converged(ViewId(9), &camera, 0.0);
+    scene.select_converged(ViewId(9), &camera, &Fineness::px(0.0));
     // From inside its bounds nothing is hidden, so the far side is loaded too.
     for azimuth in [0.0, 90.0, 180.0, 270.0] {
         let camera = common::camera(&scene, azimuth, 0.3);
-        scene.select_converged(ViewId(9), &camera, 0.0);
+        scene.select_converged(ViewId(9), &camera, &Fineness::px(0.0));
     }
     scene
 }
@@ -151,7 +157,7 @@ fn a_page_that_is_damaged_is_told_and_its_parents_are_drawn() {
     bytes[intact.skeleton().page_offset(last) as usize + 40] ^= 0x10;
     let mut scene = scene(open(bytes), 1 << 30);
     let camera = camera(&scene, 0.0, 0.5);
-    let report = scene.select_converged(ViewId(0), &camera, 0.0);
+    let report = scene.select_converged(ViewId(0), &camera, &Fineness::px(0.0));
     let damaged: Vec<_> = scene.residency().damaged().map(|(key, why)| (key.page, why.to_string())).collect();
     assert_eq!(damaged.len(), 1);
     assert_eq!(damaged[0].0, last);
@@ -192,7 +198,7 @@ fn tree_bits_that_lie_end_the_traversal_instead_of_running_on() {
     writer.finish(&skeleton, &metadata).unwrap();
     let mut scene = scene(open(out.into_inner()), 1 << 30);
     let camera = camera(&scene, 0.0, 0.5);
-    let report = scene.select_converged(ViewId(0), &camera, 0.0);
+    let report = scene.select_converged(ViewId(0), &camera, &Fineness::px(0.0));
     // Found when the page is decoded, or during the traversal; either way it is told, and the rest is drawn.
     assert!(report.inconsistent || scene.residency().damaged().count() == 1);
     assert!(report.drawn > 1000);

@@ -6,8 +6,8 @@ use common::{camera, scene, statue};
 use gigalod_format::splats::{PageId, SplatFile};
 use gigalod_runtime::residency::{InlineLoader, Loaded, Loader, ThreadedLoader};
 use gigalod_runtime::{
-    CutReport, DeviceDraw, DrawSource, FileId, InstanceId, Limit, ModelView, PageKey, PageRequest, RequestRing,
-    Residency, SelectInput, Selection, Selector, Similarity, SplatSelector, Target, ViewId,
+    CutReport, DeviceDraw, DrawSource, FileId, Fineness, InstanceId, Interrupt, Limit, ModelView, Outcome, PageKey,
+    PageRequest, RequestRing, Residency, SelectInput, Selection, Selector, Similarity, SplatSelector, Target, ViewId,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -21,8 +21,8 @@ fn two_views_of_one_file_share_pages_and_nothing_else() {
     let near = camera(&both, 0.0, 8.0);
     let far = camera(&both, 180.0, 0.2);
     loop {
-        both.select(CAMERA, &near, 1.0);
-        both.select(LIGHT, &far, 4.0);
+        both.select(CAMERA, &near, &Fineness::px(1.0));
+        both.select(LIGHT, &far, &Fineness::px(4.0));
         both.serve();
         if !both.residency().is_loading() {
             break;
@@ -37,7 +37,7 @@ fn two_views_of_one_file_share_pages_and_nothing_else() {
     };
     for (view, eye, threshold_px) in [(CAMERA, &near, 1.0), (LIGHT, &far, 4.0)] {
         let mut alone = scene(statue(), 1 << 30);
-        alone.select_converged(view, eye, threshold_px);
+        alone.select_converged(view, eye, &Fineness::px(threshold_px));
         assert!(drawn(&alone, view) == drawn(&both, view), "{view:?} sees what it would see alone");
     }
     assert!(drawn(&both, CAMERA) != drawn(&both, LIGHT));
@@ -52,7 +52,7 @@ struct DeviceSelector {
 }
 
 impl Selector for DeviceSelector {
-    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) {
+    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) -> Outcome {
         let on_device = self.lists.entry(target).or_default();
         self.host.select(target, input, on_device);
         for request in &on_device.requests {
@@ -65,6 +65,7 @@ impl Selector for DeviceSelector {
         out.draw = DrawSource::OnDevice(DeviceDraw { handle: u64::from(target.instance.0) });
         out.report = CutReport::default();
         self.frame += 1;
+        Outcome::Complete
     }
 
     fn forget(&mut self, target: Target) {
@@ -78,7 +79,7 @@ fn a_selector_on_the_device_is_served_like_one_on_the_host() {
     let with_host = {
         let mut scene = scene(statue(), 1 << 30);
         let camera = camera(&scene, 20.0, 2.0);
-        scene.select_converged(CAMERA, &camera, 2.0);
+        scene.select_converged(CAMERA, &camera, &Fineness::px(2.0));
         let (_, selection) = scene.draws(CAMERA).next().unwrap();
         selection.draw.clone()
     };
@@ -94,7 +95,9 @@ fn a_selector_on_the_device_is_served_like_one_on_the_host() {
     let mut selection = Selection::default();
     for _ in 0..40 {
         let view = ModelView::new(&camera, &Similarity::IDENTITY);
-        let input = SelectInput { file, view, threshold_px: 2.0, residency: &residency };
+        let interrupt = &Interrupt::default();
+        let (threshold_px, most_splats, room_bytes) = (2.0, u64::MAX, u64::MAX);
+        let input = SelectInput { file, view, threshold_px, most_splats, room_bytes, interrupt, residency: &residency };
         selector.select(target, &input, &mut selection);
         assert_eq!(selection.draw, DrawSource::OnDevice(DeviceDraw { handle: 0 }));
         residency.serve(&selection.requests);
@@ -110,7 +113,7 @@ fn decoded_pages_never_exceed_their_budget_and_the_report_says_what_is_missing()
     let needed = {
         let mut free = scene(statue(), 1 << 30);
         let camera = camera(&free, 0.0, 1.0);
-        free.select_converged(CAMERA, &camera, 0.0);
+        free.select_converged(CAMERA, &camera, &Fineness::px(0.0));
         free.residency().resident_bytes()
     };
     let budget = needed / 3;
@@ -118,12 +121,12 @@ fn decoded_pages_never_exceed_their_budget_and_the_report_says_what_is_missing()
     for azimuth in [0.0, 90.0, 180.0, 0.0] {
         let camera = camera(&tight, azimuth, 3.0);
         for _ in 0..30 {
-            tight.select(CAMERA, &camera, 0.0);
+            tight.select(CAMERA, &camera, &Fineness::px(0.0));
             tight.serve();
             tight.residency_mut().receive(true);
             assert!(tight.residency().resident_bytes() <= budget);
         }
-        let report = tight.select(CAMERA, &camera, 0.0);
+        let report = tight.select(CAMERA, &camera, &Fineness::px(0.0));
         assert_eq!(report.limited_by, Some(Limit::Residency));
         assert!(report.drawn > 100);
         tight.serve();
@@ -176,7 +179,7 @@ fn loading_on_threads_gives_the_same_cut() {
         let mut scene = gigalod_runtime::Scene::new(residency);
         scene.add(gigalod_runtime::Instance { file, placement: Similarity::IDENTITY });
         let camera = camera(&scene, 10.0, 1.5);
-        scene.select_converged(CAMERA, &camera, 1.0);
+        scene.select_converged(CAMERA, &camera, &Fineness::px(1.0));
         let pages: BTreeSet<u32> =
             (0..64).filter(|page| scene.residency().page(FileId(0), PageId(*page)).is_some()).collect();
         let (_, selection) = scene.draws(CAMERA).next().unwrap();

@@ -8,6 +8,7 @@ use super::divide::{Chunks, Division};
 use super::kept::KeptTree;
 use super::leaves::Leaf;
 use super::mesh::{Mesh, Positions};
+use super::points::{Cells, Fits};
 use super::tree::Extent;
 use crate::spool::{Place, Spool};
 use crate::work::Work;
@@ -22,10 +23,17 @@ use std::io;
 /// Within the longest step.
 const DIVIDING: &str = "part of tree";
 
+/// Of a point cloud: its cells; within and after the step that fits them.
+const CELLS: &str = "cells";
+const FITTING: &str = "part of radii";
+const FITTED: &str = "radii";
+
 /// What there is after each step.
 pub(super) enum Stage {
     Start,
     Read(Mesh),
+    /// Of a point cloud.
+    Cells(Facts, Cells, Fits),
     Leaves(Facts, Spool<Leaf>),
     Dividing(Facts, Division),
     Tree(Facts, Chunks),
@@ -50,6 +58,7 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
             let spools = [positions.secure()?, normals.secure()?, colors.secure()?, triangles.secure()?];
             work.finish("read", spools, Value::Null)
         }
+        Stage::Cells(facts, cells, fits) => save_fits(work, facts, cells, fits),
         Stage::Leaves(facts, leaves) => work.finish("leaves", [leaves.secure()?], facts.to_json()),
         // Was saved when it was made.
         Stage::Dividing(..) => Ok(()),
@@ -63,6 +72,31 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
             work.finish("tree", [kept.secure()?, colors.secure()?].into_iter().chain(lists), facts.to_json())
         }
     }
+}
+
+/// Keeps how many cells of a point cloud are fitted.
+pub(super) fn save_fits(work: &Work, facts: &Facts, cells: &Cells, fits: &Fits) -> io::Result<()> {
+    let place = Place::Work(work);
+    let done = fits.done();
+    let of = |what: &str| format!("{what}{done}");
+    let spools = [
+        cells.points.secure()?,
+        cells.sites.secure()?,
+        list(&place, &of("cells"), &cells.cells)?,
+        fits.points.secure()?,
+        fits.aspects.secure()?,
+        fits.crossing.secure()?,
+        list(&place, &of("patches"), &fits.patches)?,
+        list(&place, &of("first_patches"), &fits.first_patches)?,
+    ];
+    let mut state = facts.to_json();
+    state["cells"] = json!({ "done": done, "scale": cells.scale, "has_normals": cells.has_normals });
+    let phase = match done {
+        0 => CELLS,
+        _ if done < cells.cells.len() => FITTING,
+        _ => FITTED,
+    };
+    work.finish(phase, spools, state)
 }
 
 /// Keeps how far a division has come. Names have numbers that grow from each time to the next: what the journal names stays
@@ -103,6 +137,26 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
             colors: Spool::reopen(work, "colors")?,
             triangles: Spool::reopen(work, "triangles")?,
         }),
+        CELLS | FITTING | FITTED => {
+            let state = &journal.state["cells"];
+            let done: usize = of_json(state, "done").ok_or_else(odd)?;
+            let of = |what: &str| format!("{what}{done}");
+            let cells = Cells {
+                points: Spool::reopen(work, "points")?,
+                sites: Spool::reopen(work, "sites")?,
+                cells: unlist(work, &of("cells"))?,
+                scale: of_json(state, "scale").ok_or_else(odd)?,
+                has_normals: of_json(state, "has_normals").ok_or_else(odd)?,
+            };
+            let fits = Fits {
+                points: Spool::reopen(work, "fitted")?,
+                aspects: Spool::reopen(work, "aspects")?,
+                crossing: Spool::reopen(work, "crossing")?,
+                patches: unlist(work, &of("patches"))?,
+                first_patches: unlist(work, &of("first_patches"))?,
+            };
+            Stage::Cells(facts()?, cells, fits)
+        }
         "leaves" => Stage::Leaves(facts()?, Spool::reopen(work, "leaves")?),
         DIVIDING => {
             let numbers: [u64; 2] = of_json(&journal.state, "progress").ok_or_else(odd)?;

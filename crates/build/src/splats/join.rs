@@ -20,7 +20,12 @@ pub(super) struct Corners {
 
 impl Corners {
     pub(super) fn of(triangles: &[[u32; 3]]) -> Self {
-        Self { by_vertex: Vec::new(), vertices: triangles.as_flattened().to_vec() }
+        Self::of_vertices(triangles.as_flattened().to_vec())
+    }
+
+    /// Of anything that has vertices.
+    pub(super) fn of_vertices(vertices: Vec<u32>) -> Self {
+        Self { by_vertex: Vec::new(), vertices }
     }
 
     fn sort(&mut self) {

@@ -67,6 +67,30 @@ pub(super) struct KeptTree {
     pub(super) unit_nodes: Vec<u32>,
 }
 
+impl KeptTree {
+    /// For each node the number of its first child, 0 for none, where the tree lists all that hangs from it.
+    pub(super) fn first_children(&self) -> Vec<u32> {
+        let mut first_children = vec![0; self.nodes.len()];
+        // Groups whose families are still to come, the next one last.
+        let mut stack = vec![(0, 1)];
+        let mut next = 1;
+        while let Some((first, count)) = stack.pop() {
+            let from = stack.len();
+            let group = first..first + count;
+            for (node, first_child) in self.nodes[group.clone()].iter().zip(&mut first_children[group]) {
+                let children = usize::from(node.children().count);
+                if children > 0 {
+                    *first_child = next as u32;
+                    stack.push((next, children));
+                    next += children;
+                }
+            }
+            stack[from..].reverse();
+        }
+        first_children
+    }
+}
+
 /// Lists and measures the nodes of a tree. `out` is overwritten; returns the root.
 pub(super) fn keep(
     binaries: &[Binary],

@@ -39,7 +39,7 @@ pub(super) struct Leaf {
 }
 
 /// A cosine in 16 bits, rounded down.
-fn spread_of_cos(cos: f32) -> u16 {
+pub(super) fn spread_of_cos(cos: f32) -> u16 {
     // Casting truncates, and negative numbers become 0.
     ((cos + 1.0) * 32_767.5 - 0.01) as u16
 }

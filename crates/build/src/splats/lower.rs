@@ -8,6 +8,7 @@
 //! What always holds: buckets do not fall; within a bucket families keep the order of the tree, so each lies after the group it
 //! hangs from. A decoded sphere encloses all true leaves below its node.
 
+use super::below::{Below, Stack};
 use super::kept::KeptTree;
 use bytemuck::{Pod, Zeroable};
 use gigalod_geom::Sphere;
@@ -124,7 +125,8 @@ pub(super) fn lower(tree: &KeptTree, root: &Sphere, place: &Place<'_>) -> Lowere
         tree,
         codes: Vec::with_capacity(tree.nodes.len()),
         decoded: Vec::with_capacity(tree.nodes.len()),
-        first_children: vec![0; tree.nodes.len()],
+        first_children: Vec::new(),
+        below: Stack::default(),
         drafts: Vec::with_capacity(tree.nodes.len() / 8 + 1),
         stack: Vec::new(),
         levels: Vec::new(),
@@ -135,6 +137,7 @@ pub(super) fn lower(tree: &KeptTree, root: &Sphere, place: &Place<'_>) -> Lowere
     work.decoded.push(*root);
     match place {
         Place::Top(chunks) => {
+            work.first_children.resize(tree.nodes.len(), 0);
             work.count(0, root.radius);
             let mut family = Family::default();
             family.push_group(1);
@@ -145,9 +148,9 @@ pub(super) fn lower(tree: &KeptTree, root: &Sphere, place: &Place<'_>) -> Lowere
         Place::Chunk { level, .. } => {
             // The root's children were encoded with the tree on top; here for what lies below them.
             let nodes = tree.nodes[0].children().count;
-            work.first_children[0] = u32::from(nodes > 0);
+            work.first_children = tree.first_children();
             for _ in 0..nodes {
-                work.encode(0);
+                work.encode_within(0);
             }
             if nodes > 0 {
                 let level = level + 1;
@@ -164,6 +167,7 @@ struct Lowering<'a> {
     codes: Vec<u16>,
     decoded: Vec<Sphere>,
     first_children: Vec<u32>,
+    below: Stack,
     drafts: Vec<Draft>,
     stack: Vec<Group>,
     levels: Vec<(u64, f32)>,
@@ -182,8 +186,23 @@ impl Lowering<'_> {
         *widest = widest.max(radius);
     }
 
-    /// Encodes the next node, whose parent is known.
+    /// Encodes the next node of a chunk, whose parent is known, against the leaves below it.
     fn encode(&mut self, parent: usize) -> f32 {
+        let at = self.codes.len();
+        let kept = &self.tree.nodes[at];
+        let parent = &self.decoded[parent];
+        let (code, ball) = if kept.children().count == 0 {
+            sphere::encode(parent, &kept.sphere())
+        } else {
+            Below::new(&self.tree.nodes, &self.first_children).encode(at as u32, parent, &mut self.below)
+        };
+        self.codes.push(code);
+        self.decoded.push(ball);
+        ball.radius
+    }
+
+    /// Encodes the next node, whose parent is known and whose leaves are elsewhere, against its true ball.
+    fn encode_within(&mut self, parent: usize) -> f32 {
         let kept = &self.tree.nodes[self.codes.len()];
         let true_parent = self.tree.nodes[parent].sphere();
         let (code, ball) = sphere::encode_within(&self.decoded[parent], &true_parent, &kept.sphere());
@@ -194,6 +213,7 @@ impl Lowering<'_> {
 
     /// Family by family, as the nodes come.
     fn descend(&mut self, chunks: &[Option<u32>]) {
+        let is_top = !chunks.is_empty();
         while let Some(group) = self.stack.pop() {
             let first = group.first_node as usize;
             let tree = self.tree;
@@ -222,7 +242,7 @@ impl Lowering<'_> {
                 let first_node = self.codes.len() as u32;
                 self.first_children[parent] = first_node;
                 for _ in 0..nodes {
-                    let radius = self.encode(parent);
+                    let radius = if is_top { self.encode_within(parent) } else { self.encode(parent) };
                     self.count(level, radius);
                 }
                 draft.family.push_group(usize::from(nodes));

@@ -118,7 +118,7 @@ impl Positions {
     }
 }
 
-/// An indexed mesh as it was read.
+/// An indexed mesh as it was read; without triangles it is a point cloud.
 pub(super) struct Mesh {
     pub(super) positions: Positions,
     /// One for each vertex, or empty.
@@ -156,8 +156,8 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
         push().map_err(BuildError::Scratch)?;
         phases.at(input.bytes_consumed().0);
     }
-    if mesh.triangles.len() == 0 {
-        return Err(BuildError::NoTriangles { vertices: mesh.positions.len() });
+    if mesh.positions.len() == 0 {
+        return Err(BuildError::Nothing);
     }
     if mesh.positions.len() >= 1 << 31 {
         return Err(BuildError::TooManyVertices { found: mesh.positions.len() });

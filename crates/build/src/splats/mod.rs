@@ -1,4 +1,4 @@
-//! Splats: the bounding-sphere hierarchy of the splats paper, section 2.2, from a triangle mesh.
+//! Splats: the bounding-sphere hierarchy of the splats paper, section 2.2, from a triangle mesh or a point cloud.
 //!
 //! The way of the data, a file for each step:
 //!
@@ -8,6 +8,8 @@
 //!          join       65,536     midpoint children               by size            the file
 //! ```
 //!
+//! A model without triangles is a point cloud: its leaves come from `points/`.
+//!
 //! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk. On
 //! disk, `checkpoint.rs` makes of the end of each step a place to continue from.
 //!
@@ -15,6 +17,7 @@
 //! triangles at the vertices below it. The bytes of the file depend on the sets of vertices and triangles and on nothing else: not
 //! on their order in the input, not on memory, not on threads.
 
+mod below;
 mod checkpoint;
 mod chunk;
 mod contract;
@@ -30,6 +33,7 @@ mod mesh;
 mod orientation;
 mod pages;
 mod plan;
+mod points;
 mod quantise;
 mod reorder;
 mod tree;
@@ -52,7 +56,7 @@ use std::path::Path;
 /// In files and in journals.
 const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"));
 
-/// Builds `out` from a mesh.
+/// Builds `out` from a mesh, or, where there are no triangles, from a point cloud.
 ///
 /// # Errors
 /// Whatever is wrong with the input, the budget or the output; `out` is then as it was before.
@@ -97,6 +101,20 @@ pub fn build(
             Stage::Start => {
                 let mut input = input.take().expect("a build starts once");
                 Stage::Read(mesh::read(&mut *input, &plan, &phases)?)
+            }
+            Stage::Read(cloud) if cloud.triangles.len() == 0 => {
+                let (facts, cells) = workers.install(|| points::divide(cloud, &plan, &phases))?;
+                Stage::Cells(facts, cells, points::Fits::new(&plan).map_err(BuildError::Scratch)?)
+            }
+            Stage::Cells(facts, cells, fits) => {
+                let save = |fits: &points::Fits| match &work {
+                    Some(work) => checkpoint::save_fits(work, &facts, &cells, fits),
+                    None => Ok(()),
+                };
+                let fits = workers.install(|| points::fit(&cells, fits, up, &plan, &phases, save));
+                let fits = fits.map_err(BuildError::Scratch)?;
+                let leaves = workers.install(|| points::from_fits(&facts, cells, fits, up, &plan, &phases));
+                Stage::Leaves(facts, leaves.map_err(BuildError::Scratch)?)
             }
             Stage::Read(mesh) => {
                 let counts = InputCounts { triangles: mesh.triangles.len(), vertices: mesh.positions.len(), points: 0 };

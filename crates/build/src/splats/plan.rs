@@ -13,6 +13,10 @@ use gigalod_import::ModelStream;
 const SPOOLED_PER_VERTEX: u64 = 24 + 12 + 3 + 16 + 4;
 const SPOOLED_PER_TRIANGLE: u64 = 12 + 6;
 
+/// What they take for each point of a cloud without faces. What is spooled first is less than of a mesh, which has two triangles
+/// a vertex; from the leaves on it is the same.
+const SPOOLED_PER_POINT: u64 = SPOOLED_PER_VERTEX + 2 * SPOOLED_PER_TRIANGLE + 5;
+
 /// Bytes of work for each triangle that is joined with its vertices at a time: the triangle, its corners, their order, positions,
 /// and what it gives to its vertices; all but the positions twice, as the batch before is gathered meanwhile.
 const WORK_PER_TRIANGLE: u64 = 12 + 3 * 24 + 2 * (12 + 3 * 8 + 32 + 6);
@@ -42,7 +46,9 @@ pub(super) fn threads(options: &Options) -> usize {
 pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bool {
     let spooled = match (input.declared_vertices(), input.declared_faces()) {
         (Some(vertices), Some(faces)) => {
-            vertices.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE))
+            let mesh =
+                vertices.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE));
+            mesh.max(vertices.saturating_mul(SPOOLED_PER_POINT))
         }
         _ => u64::MAX,
     };

@@ -104,18 +104,23 @@ pub(super) fn split(leaves: &mut [Leaf]) -> usize {
         leaves.sort_unstable_by_key(in_one_place);
         return leaves.len() / 2;
     };
-    let (mut low, mut high) = (0, leaves.len());
+    partition(leaves, |leaf| plane.is_left(leaf.center))
+}
+
+/// Puts those on the left before all others; returns how many they are.
+pub(super) fn partition<T>(records: &mut [T], is_left: impl Fn(&T) -> bool) -> usize {
+    let (mut low, mut high) = (0, records.len());
     loop {
-        while low < high && plane.is_left(leaves[low].center) {
+        while low < high && is_left(&records[low]) {
             low += 1;
         }
-        while low < high && !plane.is_left(leaves[high - 1].center) {
+        while low < high && !is_left(&records[high - 1]) {
             high -= 1;
         }
         if low >= high {
             return low;
         }
-        leaves.swap(low, high - 1);
+        records.swap(low, high - 1);
     }
 }
 

@@ -115,12 +115,12 @@ impl Model {
             let has_own = |symbol: &u64| mask >> symbol & 1 == 1;
             assert!((0..64).filter(has_own).all(|symbol| legal.contains(&symbol)));
             let mut own = legal.iter().copied().filter(has_own).count();
-            let mut left = 1024 - (legal.len() - own) as u64;
+            let mut left = 512 - (legal.len() - own) as u64;
             let mut table = Vec::new();
             for (place, symbol) in legal.iter().enumerate() {
                 let frequency = if mask == 0 {
-                    let share = 1024 / legal.len() as u64;
-                    if place == 0 { 1024 - share * (legal.len() as u64 - 1) } else { share }
+                    let share = 512 / legal.len() as u64;
+                    if place == 0 { 512 - share * (legal.len() as u64 - 1) } else { share }
                 } else if !has_own(symbol) {
                     1
                 } else if own == 1 {
@@ -134,7 +134,7 @@ impl Model {
                 };
                 table.push((*symbol, frequency));
             }
-            assert_eq!(table.iter().map(|(_, frequency)| frequency).sum::<u64>(), 1024);
+            assert_eq!(table.iter().map(|(_, frequency)| frequency).sum::<u64>(), 512);
             tables.insert(context, table);
         }
         assert_eq!(rest.next(), None);
@@ -147,16 +147,16 @@ struct Words(std::vec::IntoIter<u64>);
 
 impl Words {
     fn symbol(&mut self, x: &mut u64, model: &Model, context: i64) -> i64 {
-        let slot = *x % 1024;
+        let slot = *x % 512;
         let mut start = 0;
         for (symbol, frequency) in &model.0[&context] {
             if slot < start + frequency {
-                self.fill(x, frequency * (*x / 1024) + slot - start);
+                self.fill(x, frequency * (*x / 512) + slot - start);
                 return *symbol as i64;
             }
             start += frequency;
         }
-        unreachable!("frequencies sum to 1024")
+        unreachable!("frequencies sum to 512")
     }
 
     fn bits(&mut self, x: &mut u64, bits: i64) -> i64 {

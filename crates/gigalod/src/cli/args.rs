@@ -3,6 +3,7 @@
 use super::parse;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gigalod_geom::ImageSize;
+use gigalod_render::Kernel;
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -136,9 +137,13 @@ pub(crate) struct DrawArgs {
     /// Colour each level of detail differently
     #[arg(long)]
     pub(crate) lod_colors: bool,
-    /// Most memory for decoded pages
+    /// Most memory for the model: decoded pages, and lists of what is drawn
     #[arg(long, default_value = "1GiB", value_parser = parse::size, value_name = "SIZE")]
     pub(crate) cpu_budget: u64,
+    /// Most memory on the graphics device, the picture included; where it does not suffice the model is drawn coarser [default:
+    /// all there is]
+    #[arg(long, value_parser = parse::size, value_name = "SIZE")]
+    pub(crate) gpu_budget: Option<u64>,
 }
 
 /// Move along a camera path and measure every frame
@@ -201,6 +206,27 @@ pub(crate) enum KernelArg {
     Square,
     /// Each ball's silhouette
     Round,
+    /// Soft spots that blend: slower, least aliased
+    Gauss,
+    /// Squares foreshortened by the surface's slope; may leave holes
+    SquareEllipse,
+    /// Silhouettes foreshortened by the surface's slope; may leave holes
+    RoundEllipse,
+    /// Soft spots foreshortened by the surface's slope
+    GaussEllipse,
+}
+
+impl From<KernelArg> for Kernel {
+    fn from(kernel: KernelArg) -> Self {
+        match kernel {
+            KernelArg::Square => Self::Square,
+            KernelArg::Round => Self::Round,
+            KernelArg::Gauss => Self::Gauss,
+            KernelArg::SquareEllipse => Self::SquareEllipse,
+            KernelArg::RoundEllipse => Self::RoundEllipse,
+            KernelArg::GaussEllipse => Self::GaussEllipse,
+        }
+    }
 }
 
 /// Tell what a .glod file holds

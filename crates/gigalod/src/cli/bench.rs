@@ -5,10 +5,10 @@ use super::cache;
 use super::error::{CliError, Outcome};
 use super::path_file;
 use super::progress::Console;
-use super::stage::{CAMERA, Stage};
+use super::stage::{CAMERA, Stage, Wait};
 use gigalod_build::Progress;
 use gigalod_geom::{Camera, CameraPath};
-use gigalod_render::Look;
+use gigalod_render::{Look, Renderer};
 use gigalod_runtime::{CutReport, Fineness, FrameRate};
 use serde::Serialize;
 use std::fmt::Write;
@@ -75,6 +75,7 @@ struct Run<'a> {
     stage: &'a mut Stage,
     path: CameraPath,
     args: &'a BenchArgs,
+    console: &'a Console,
     look: Look,
     frames: Vec<FrameFigures>,
     last: CutReport,
@@ -83,13 +84,13 @@ struct Run<'a> {
 pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliError> {
     let path = path_file::read(&args.path)?;
     let file = cache::container_of(&args.file, &args.build, console)?;
-    let mut stage = Stage::open(&file, args.draw.cpu_budget)?;
+    let mut stage = Stage::open(&file, args.draw.budgets())?;
     stage.scene.splats_mut().tint = args.draw.tint();
-    let mut run =
-        Run { stage: &mut stage, path, args, look: args.draw.look(), frames: Vec::new(), last: CutReport::default() };
+    let look = args.draw.look();
+    let mut run = Run { stage: &mut stage, path, args, console, look, frames: Vec::new(), last: CutReport::default() };
     let on_path = match args.target_ms {
-        None => run.each_pose(console)?,
-        Some(target_ms) => run.in_real_time(target_ms, console)?,
+        None => run.each_pose()?,
+        Some(target_ms) => run.in_real_time(target_ms)?,
     };
     let (frames, last) = (run.frames, run.last);
     let summary = summary(&frames, on_path, args);
@@ -101,20 +102,20 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliErr
 
 impl Run<'_> {
     /// Each pose once. Returns the number of frames.
-    fn each_pose(&mut self, console: &Console) -> Result<usize, CliError> {
-        let work = console.work("bench");
+    fn each_pose(&mut self) -> Result<usize, CliError> {
+        let work = self.console.work("bench");
         work.begin("draw", self.path.frames.len() as u64);
-        let wanted = Fineness { threshold_px: self.args.draw.threshold_px() as f32, most_splats: u64::MAX };
+        let wanted = Fineness::px(self.args.draw.threshold_px() as f32);
         for index in 0..self.path.frames.len() {
-            self.frame(self.path.frames[index].t, wanted)?;
+            self.frame(self.path.frames[index].t, &wanted)?;
             work.at(index as u64 + 1);
         }
         Ok(self.frames.len())
     }
 
     /// The path as fast as time passes, then at rest until nothing gets finer. Returns the number of frames on the path.
-    fn in_real_time(&mut self, target_ms: f64, console: &Console) -> Result<usize, CliError> {
-        let work = console.work("bench");
+    fn in_real_time(&mut self, target_ms: f64) -> Result<usize, CliError> {
+        let work = self.console.work("bench");
         let (first, last) = (self.path.frames[0].t, self.path.frames[self.path.frames.len() - 1].t);
         work.begin("play", ((last - first) * 1e3) as u64);
         let mut control = FrameRate::new(target_ms, self.args.draw.threshold_px() as f32);
@@ -142,33 +143,30 @@ impl Run<'_> {
     }
 
     fn paced_frame(&mut self, t: f64, moved: bool, control: &mut FrameRate) -> Result<(), CliError> {
-        self.frame(t, control.next(moved))?;
+        self.frame(t, &control.next(moved))?;
         let drawn = self.frames.last().expect("a frame was just drawn");
-        control.drew(drawn.frame_ms, drawn.threshold_px, &self.last, self.stage.scene.residency().is_loading());
+        control.drew(drawn.frame_ms, &self.last, self.stage.scene.residency().is_loading());
         Ok(())
     }
 
     /// One frame of what is resident now.
-    fn frame(&mut self, t: f64, wanted: Fineness) -> Result<(), CliError> {
+    fn frame(&mut self, t: f64, wanted: &Fineness) -> Result<(), CliError> {
         let pose = self.path.at(t);
         let fov = self.args.fov.unwrap_or(self.path.fov_deg).to_radians();
         let camera = Camera::look_at(pose.eye, pose.target, self.path.up, fov, self.args.draw.size);
-        let begun = Instant::now();
+        let drawn = self.stage.draw_until(&camera, self.look, wanted, Wait::Never, Renderer::draw, self.console)?;
         let scene = &mut self.stage.scene;
-        scene.residency_mut().receive(false);
-        self.last = scene.select(CAMERA, &camera, wanted.threshold_px);
         let page_misses = scene.draws(CAMERA).map(|(_, selection)| selection.requests.len() as u64).sum();
         scene.serve();
-        let select_ms = begun.elapsed().as_secs_f64() * 1e3;
-        self.stage.draw_frame(&camera, self.look)?;
+        self.last = drawn.report;
         self.frames.push(FrameFigures {
             t,
-            frame_ms: begun.elapsed().as_secs_f64() * 1e3,
-            select_ms,
-            upload_bytes: self.last.drawn * 20,
+            frame_ms: drawn.frame_ms,
+            select_ms: drawn.select_ms,
+            upload_bytes: self.stage.renderer.uploaded_bytes(),
             triangles: 0,
             points: self.last.drawn,
-            threshold_px: wanted.threshold_px,
+            threshold_px: self.last.threshold_px,
             max_error_px: self.last.max_error_px.is_finite().then_some(self.last.max_error_px),
             page_misses,
         });

@@ -51,10 +51,14 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
     let (seconds, cpu_seconds) = usage.seconds();
     let metadata = &report.metadata;
     if metadata.leaves < FEW_VERTICES {
-        let what = format!(
-            "only {} vertices; splats are made for dense scans, large triangles become large discs",
-            metadata.leaves
-        );
+        let what = if metadata.input.points > 0 {
+            format!("only {} points; splats are made for dense scans", metadata.leaves)
+        } else {
+            format!(
+                "only {} vertices; splats are made for dense scans, large triangles become large discs",
+                metadata.leaves
+            )
+        };
         console.warn(&CliError::in_file(input, what));
     }
     let json = BuildReport {
@@ -72,9 +76,12 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         resumed_after: report.resumed_after.as_deref(),
     };
     let text = format!(
-        "{}: {} triangles as {} splats on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
+        "{}: {} as {} splats on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
         args.output.display(),
-        metadata.input.triangles,
+        match metadata.input {
+            InputCounts { points, triangles: 0, .. } => format!("{points} points"),
+            InputCounts { triangles, .. } => format!("{triangles} triangles"),
+        },
         metadata.leaves,
         metadata.levels,
         readable_bytes(report.output_bytes),

@@ -80,9 +80,6 @@ impl CliError {
             BuildError::Crowd { .. } => Self::in_file(input, error).hint("give a larger --memory, as --memory 8GiB"),
             BuildError::Scratch(_) => Self::in_file(output, error)
                 .hint("temporary files lie in the folder of the output, and may be larger than the input"),
-            BuildError::NoTriangles { .. } => {
-                Self::in_file(input, error).hint("point clouds without faces cannot be built yet")
-            }
             error => Self::in_file(input, error),
         }
     }

@@ -57,7 +57,13 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     };
     line("kind", format!("{} (format version {})", container.kind().name(), gigalod_format::VERSION));
     line("built by", metadata.generator.clone());
-    line("input", format!("{} triangles, {} vertices", metadata.input.triangles, metadata.input.vertices));
+    line(
+        "input",
+        match metadata.input {
+            InputCounts { points, triangles: 0, .. } => format!("{points} points"),
+            InputCounts { triangles, vertices, .. } => format!("{triangles} triangles, {vertices} vertices"),
+        },
+    );
     for (name, value) in &metadata.options {
         line("option", format!("{name} = {value}"));
     }

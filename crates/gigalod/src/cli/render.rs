@@ -6,15 +6,14 @@ use super::error::{CliError, Outcome};
 use super::files;
 use super::path_file;
 use super::progress::Console;
-use super::stage::{CAMERA, Stage};
+use super::stage::{Drawn, Stage, Wait};
 use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
 use gigalod_geom::{Aabb, Camera, ImageSize};
-use gigalod_render::{Look, Picture};
+use gigalod_render::{Look, Picture, Renderer};
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Limit};
+use gigalod_runtime::{CutReport, Fineness, Limit};
 use serde::Serialize;
 use std::path::Path;
-use std::time::Instant;
 
 /// The JSON object of `render`.
 #[derive(Serialize)]
@@ -27,7 +26,7 @@ struct RenderReport {
     max_error_px: Option<f64>,
     converged: bool,
     limited_by: Option<&'static str>,
-    drawn: Drawn,
+    drawn: DrawnCounts,
     culled: Culled,
     bytes_read: u64,
     cpu_bytes: u64,
@@ -38,7 +37,7 @@ struct RenderReport {
 }
 
 #[derive(Serialize)]
-struct Drawn {
+struct DrawnCounts {
     nodes: u64,
     triangles: u64,
     points: u64,
@@ -72,7 +71,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
     }
     files::check_png_name(&args.output)?;
     let file = cache::container_of(&args.file, &args.build, console)?;
-    let mut stage = Stage::open(&file, args.draw.cpu_budget)?;
+    let mut stage = Stage::open(&file, args.draw.budgets())?;
     let camera = camera(&args.camera, args.draw.size, &stage.bounds(), stage.up())?;
     let job = Job {
         camera,
@@ -89,14 +88,9 @@ impl Stage {
     /// Draws one picture and writes it; `name` is what messages call the model.
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
         self.scene.splats_mut().tint = job.tint;
-        let threshold_px = job.threshold_px as f32;
-        self.scene.select_converged(CAMERA, &job.camera, threshold_px);
-        // Once more with everything there: the time that a warm cut takes.
-        let begun = Instant::now();
-        let report = self.scene.select(CAMERA, &job.camera, threshold_px);
-        let select_ms = begun.elapsed().as_secs_f64() * 1e3;
-        let picture = self.picture(&job.camera, job.look)?;
-        let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let wanted = Fineness::px(job.threshold_px as f32);
+        let Drawn { report, select_ms, frame_ms, what: picture } =
+            self.draw_until(&job.camera, job.look, &wanted, Wait::Converged, Renderer::picture, console)?;
 
         files::write_png(job.output, picture.size, &picture.rgba)?;
         if let Some(depth) = job.depth {
@@ -123,7 +117,8 @@ impl Stage {
         problems: Vec<String>,
     ) -> RenderReport {
         let residency = self.scene.residency();
-        let complete = !residency.is_full() && problems.is_empty();
+        let complete =
+            !residency.is_full() && report.limited_by != Some(Limit::Budget) && residency.damaged().next().is_none();
         RenderReport {
             width: job.camera.size.width,
             height: job.camera.size.height,
@@ -132,10 +127,10 @@ impl Stage {
             max_error_px: report.max_error_px.is_finite().then_some(f64::from(report.max_error_px)),
             converged: complete,
             limited_by: report.limited_by.map(|limit| limit.name()),
-            drawn: Drawn { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
+            drawn: DrawnCounts { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
             culled: Culled { frustum: report.culled_frustum, backface: report.culled_backface },
             bytes_read: residency.bytes_read(),
-            cpu_bytes: residency.resident_bytes(),
+            cpu_bytes: self.scene.cpu_bytes(),
             gpu_bytes: self.renderer.gpu_bytes(),
             select_ms,
             frame_ms,

@@ -1,43 +1,81 @@
 //! A model open for drawing: scene, loaders and graphics device, as `render`, `bench` and `demo` use them.
 
-use super::args::{DrawArgs, KernelArg};
+use super::args::DrawArgs;
 use super::error::CliError;
 use super::files;
 use super::progress::Console;
 use gigalod_format::splats::SplatFile;
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera};
-use gigalod_render::{Frame, Gpu, Kernel, Lighting, Look, Picture, RenderError, Renderer};
+use gigalod_render::{Frame, Gpu, Lighting, Look, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{CutReport, Fineness, Instance, Residency, Scene, Similarity, ViewId};
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// The one view of a picture.
 pub(crate) const CAMERA: ViewId = ViewId(0);
+
+/// A device that is lost so often during one frame stays lost.
+const MOST_LOSSES: u32 = 3;
+
+/// Where there is no memory for so few, coarser will not help.
+const FEWEST_SPLATS: u64 = 1000;
 
 /// A model open for drawing.
 pub(crate) struct Stage {
     pub(crate) scene: Scene,
     pub(crate) renderer: Renderer,
     up: UpAxis,
+    /// What a device without enough memory has left.
+    most_splats: u64,
+    happened: Vec<String>,
+}
+
+/// Most memory to use.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Budgets {
+    /// Bytes for pages and lists.
+    pub(crate) cpu: u64,
+    /// Bytes on the graphics device; `None` for all there is.
+    pub(crate) gpu: Option<u64>,
+}
+
+/// Whether a frame waits for pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wait {
+    /// It draws what is there.
+    Never,
+    /// Until nothing that could be loaded is missing.
+    Converged,
+}
+
+/// A frame that was drawn; times on the clock, from the beginning of its last cut.
+pub(crate) struct Drawn<T> {
+    pub(crate) report: CutReport,
+    pub(crate) select_ms: f64,
+    pub(crate) frame_ms: f64,
+    pub(crate) what: T,
 }
 
 impl Stage {
     /// Opens a `.glod` file and the graphics device.
-    pub(crate) fn open(file: &Path, cpu_budget: u64) -> Result<Self, CliError> {
+    pub(crate) fn open(file: &Path, budgets: Budgets) -> Result<Self, CliError> {
         let splats: SplatFile = files::open_splats(file)?;
         let up = splats.skeleton().root().up;
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get()).min(4);
         let loader = ThreadedLoader::new(threads)
             .map_err(|error| CliError::new(format!("could not start loading threads: {error}")))?;
-        let mut residency = Residency::new(cpu_budget, Box::new(loader));
+        let mut residency = Residency::new(budgets.cpu, Box::new(loader));
         let id = residency.add(Arc::new(splats));
         let mut scene = Scene::new(residency);
+        scene.set_cpu_budget(budgets.cpu);
         scene.add(Instance { file: id, placement: Similarity::IDENTITY });
-        let renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
-        Ok(Self { scene, renderer, up })
+        let mut renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
+        renderer.set_budget(budgets.gpu);
+        Ok(Self { scene, renderer, up, most_splats: u64::MAX, happened: Vec::new() })
     }
 
     /// Around the model.
@@ -50,19 +88,58 @@ impl Stage {
         self.up
     }
 
-    /// A picture of the last cut.
-    pub(crate) fn picture(&mut self, camera: &Camera, look: Look) -> Result<Picture, CliError> {
-        let draws =
-            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-        self.renderer.picture(&Frame { camera: *camera, look, draws }).map_err(graphics_error)
+    /// Cuts and draws with `draw`. A device that is lost is opened anew; one whose memory does not suffice gets a coarser cut,
+    /// also from then on. Both are told, and are among the [`Stage::problems`].
+    pub(crate) fn draw_until<T>(
+        &mut self,
+        camera: &Camera,
+        look: Look,
+        wanted: &Fineness,
+        wait: Wait,
+        draw: fn(&mut Renderer, &Frame<'_>) -> Result<T, RenderError>,
+        console: &Console,
+    ) -> Result<Drawn<T>, CliError> {
+        let mut losses = 0;
+        loop {
+            let room = self.renderer.most_splats(camera.size, look.kernel);
+            let most_splats = wanted.most_splats.min(self.most_splats).min(room);
+            let fineness = Fineness { most_splats, ..*wanted };
+            if wait == Wait::Converged {
+                // Then once more with everything there: the time that a warm cut takes.
+                self.scene.select_converged(CAMERA, camera, &fineness);
+            }
+            let begun = Instant::now();
+            self.scene.residency_mut().receive(false);
+            let report = self.scene.select(CAMERA, camera, &fineness);
+            let select_ms = begun.elapsed().as_secs_f64() * 1e3;
+            let draws =
+                self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
+            match draw(&mut self.renderer, &Frame { camera: *camera, look, draws }) {
+                Ok(what) => {
+                    let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+                    return Ok(Drawn { report, select_ms, frame_ms, what });
+                }
+                Err(RenderError::DeviceLost(why)) if losses < MOST_LOSSES => {
+                    losses += 1;
+                    self.happened(format!("the graphics device was lost and is opened anew: {why}"), console);
+                    self.renderer.recover().map_err(graphics_error)?;
+                }
+                Err(RenderError::OutOfMemory(why)) if report.drawn > FEWEST_SPLATS => {
+                    self.most_splats = report.drawn / 2;
+                    self.happened(format!("the graphics device is out of memory, drawn coarser: {why}"), console);
+                }
+                Err(error) => return Err(graphics_error(error)),
+            }
+        }
     }
 
-    /// Draws the last cut and waits until the device has done so.
-    pub(crate) fn draw_frame(&mut self, camera: &Camera, look: Look) -> Result<(), CliError> {
-        self.picture(camera, look).map(|_| ())
+    /// Something went wrong and was put right.
+    fn happened(&mut self, what: String, console: &Console) {
+        console.warn(&CliError::new(&what));
+        self.happened.push(what);
     }
 
-    /// What is wrong with the file, as far as it was read; `name` is what messages call it.
+    /// What is wrong with the file, as far as it was read, and what went wrong with the device; `name` is what messages call it.
     pub(crate) fn problems(&self, name: &Path, report: &CutReport, console: &Console) -> Vec<String> {
         let damaged = self.scene.residency().damaged();
         let mut problems: Vec<String> =
@@ -73,6 +150,7 @@ impl Stage {
         for problem in &problems {
             console.warn(&CliError::new(problem));
         }
+        problems.extend_from_slice(&self.happened);
         problems
     }
 }
@@ -85,12 +163,13 @@ impl DrawArgs {
 
     pub(crate) fn look(&self) -> Look {
         Look {
-            kernel: match self.kernel {
-                KernelArg::Square => Kernel::Square,
-                KernelArg::Round => Kernel::Round,
-            },
+            kernel: self.kernel.into(),
             lighting: Lighting { towards_light: self.light, background: self.background },
         }
+    }
+
+    pub(crate) fn budgets(&self) -> Budgets {
+        Budgets { cpu: self.cpu_budget, gpu: self.gpu_budget }
     }
 
     pub(crate) fn tint(&self) -> Tint {
@@ -104,6 +183,8 @@ fn graphics_error(error: RenderError) -> CliError {
         RenderError::NoAdapter(_) => {
             error_line.hint("install a Vulkan driver, as mesa-vulkan-drivers and libvulkan1 on Debian and Ubuntu")
         }
+        RenderError::Budget { .. } => error_line.hint("give a larger --gpu-budget, or a smaller --size"),
+        RenderError::OutOfMemory(_) => error_line.hint("a smaller --size takes less"),
         _ => error_line,
     }
 }

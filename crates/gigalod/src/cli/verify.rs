@@ -6,7 +6,7 @@ use super::files;
 use super::progress::Console;
 use gigalod::verify::{self, Measured, Problems};
 use gigalod_build::Progress;
-use gigalod_import::read_all;
+use gigalod_import::{Batch, read_all};
 use gigalod_reference::Mesh;
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,10 +41,20 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
     if let Some(original) = &args.against
         && problems.count == 0
     {
-        let mesh = read_mesh(original, &work)?;
-        work.begin("measure", verify::steps(&tree, &mesh));
-        let figures = verify::against(&tree, splats.skeleton().root().origin, &mesh, &|done| work.at(done));
-        judge(&figures, &mesh, splats.skeleton().root().leaves, &mut problems);
+        let model = read_model(original, &work)?;
+        let (origin, leaves) = (splats.skeleton().root().origin, splats.skeleton().root().leaves);
+        let at = |done| work.at(done);
+        let figures = if model.triangles.is_empty() {
+            work.begin("measure", verify::steps_of_points(&tree, &model.vertices));
+            expect_leaves(leaves, model.vertices.positions.len() as u64, "points", &mut problems);
+            verify::against_points(&tree, origin, &model.vertices, &at)
+        } else {
+            let mesh = verify::mesh_of(model).map_err(|error| CliError::in_file(original, error))?;
+            work.begin("measure", verify::steps(&tree, &mesh));
+            expect_leaves(leaves, count_referenced(&mesh), "referenced vertices", &mut problems);
+            verify::against(&tree, origin, &mesh, &at)
+        };
+        judge(&figures, &mut problems);
         measured = Some(figures);
     }
     work.finish();
@@ -78,7 +88,7 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
 }
 
 /// Turns figures that no sound file has into problems.
-fn judge(measured: &Measured, mesh: &Mesh, leaves: u64, problems: &mut Problems) {
+fn judge(measured: &Measured, problems: &mut Problems) {
     if measured.violations > 0 {
         let Measured { violations, worst_ratio, .. } = measured;
         problems.count += violations;
@@ -86,21 +96,27 @@ fn judge(measured: &Measured, mesh: &Mesh, leaves: u64, problems: &mut Problems)
             .told
             .push(format!("{violations} violations of stored errors or enclosures, the worst ratio is {worst_ratio}"));
     }
+}
+
+/// There is a leaf for each of what the model has.
+fn expect_leaves(leaves: u64, expected: u64, what: &str, problems: &mut Problems) {
+    if leaves != expected {
+        problems.count += 1;
+        problems.told.push(format!("{leaves} leaves, expected one for each of {expected} {what}"));
+    }
+}
+
+fn count_referenced(mesh: &Mesh) -> u64 {
     let mut referenced = vec![false; mesh.positions().len()];
     for vertex in mesh.triangles().as_flattened() {
         referenced[*vertex as usize] = true;
     }
-    let referenced = referenced.iter().filter(|used| **used).count() as u64;
-    if referenced != leaves {
-        problems.count += 1;
-        problems.told.push(format!("{leaves} leaves, expected one for each of {referenced} referenced vertices"));
-    }
+    referenced.iter().filter(|used| **used).count() as u64
 }
 
-/// Reads a whole mesh into memory.
-fn read_mesh(path: &Path, work: &dyn Progress) -> Result<Mesh, CliError> {
+/// Reads a whole model into memory.
+fn read_model(path: &Path, work: &dyn Progress) -> Result<Batch, CliError> {
     let mut stream = files::open_model(path)?;
     work.begin("read", stream.bytes_consumed().1);
-    let all = read_all(&mut *stream, &mut |done, _| work.at(done)).map_err(|error| CliError::import(path, &error))?;
-    verify::mesh_of(all).map_err(|error| CliError::in_file(path, error))
+    read_all(&mut *stream, &mut |done, _| work.at(done)).map_err(|error| CliError::import(path, &error))
 }

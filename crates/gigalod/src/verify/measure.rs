@@ -28,7 +28,8 @@ pub struct Measured {
     /// Largest ratio of a node's distance, bounded from above, to its stored error; at most 1 in a sound file.
     pub worst_ratio: f64,
     /// Vertices whose sphere is not enclosed, corners whose triangle's normal is in no cone, samples that are not covered, and
-    /// nodes beyond their stored error.
+    /// nodes beyond their stored error. Of a point cloud: points whose least sphere is not enclosed or whose own normal is in no
+    /// cone, and such nodes.
     pub violations: u64,
 }
 
@@ -53,19 +54,30 @@ pub fn steps(tree: &SplatTree, mesh: &Mesh) -> u64 {
 /// Measures. `origin` is that of the file's local space, in model space. `at` is told from time to time, by any thread, how many
 /// of the [`steps`] are done.
 pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh, at: &(dyn Fn(u64) + Sync)) -> Measured {
-    let steps = Steps { done: AtomicU64::new(0), at };
+    let steps = Steps::new(at);
     let bvh = Bvh::build(mesh);
     let enclosed = count_unenclosed_vertices(tree, origin, mesh, &steps);
     let uncovered = count_uncovered_samples(tree, origin, mesh, &steps);
     let hidden = count_hidden_fronts(tree, origin, mesh, &steps);
 
+    let distance = |point: DVec3| bvh.nearest_point(point).map_or(f64::INFINITY, |nearest| nearest.distance);
+    nodes_against(tree, origin, &distance, &steps, enclosed + uncovered + hidden)
+}
+
+/// Measures all nodes by how far a point of model space is from the original. `violations` is what was found before.
+pub(super) fn nodes_against(
+    tree: &SplatTree,
+    origin: DVec3,
+    distance: &(impl Fn(DVec3) -> f64 + Sync),
+    steps: &Steps<'_>,
+    violations: u64,
+) -> Measured {
     let per_node: Vec<NodeDistances> = tree
         .nodes
         .par_iter()
         .map(|node| {
             let center = origin + node.sphere.center.as_dvec3();
             let radius = f64::from(node.sphere.radius);
-            let distance = |point: DVec3| bvh.nearest_point(point).map_or(f64::INFINITY, |nearest| nearest.distance);
             // A point of the ball is at most a radius farther away than its centre.
             let bound = distance(center) + radius;
             let stored = 2.0 * radius;
@@ -91,18 +103,22 @@ pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh, at: &(dyn Fn(u64) +
         hausdorff: per_node.iter().map(|node| node.farthest).fold(0.0, f64::max),
         rms: (squares / (leaves * DIRECTIONS.len()) as f64).sqrt(),
         worst_ratio: per_node.iter().map(|node| node.ratio).fold(0.0, f64::max),
-        violations: enclosed + uncovered + hidden + beyond,
+        violations: violations + beyond,
     }
 }
 
 /// Counts what is done, and tells now and then.
-struct Steps<'a> {
+pub(super) struct Steps<'a> {
     done: AtomicU64,
     at: &'a (dyn Fn(u64) + Sync),
 }
 
-impl Steps<'_> {
-    fn step(&self) {
+impl<'a> Steps<'a> {
+    pub(super) fn new(at: &'a (dyn Fn(u64) + Sync)) -> Self {
+        Self { done: AtomicU64::new(0), at }
+    }
+
+    pub(super) fn step(&self) {
         const OFTEN: u64 = 1 << 12;
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         if done.is_multiple_of(OFTEN) {
@@ -165,12 +181,12 @@ fn count_uncovered_samples(tree: &SplatTree, origin: DVec3, mesh: &Mesh, steps: 
 }
 
 /// True when a path from the root to a leaf encloses the ball all the way; local space.
-fn has_enclosing_path(tree: &SplatTree, center: DVec3, radius: f64) -> bool {
+pub(super) fn has_enclosing_path(tree: &SplatTree, center: DVec3, radius: f64) -> bool {
     has_path(tree, center, radius, None)
 }
 
 /// True when the spheres of a path from the root to a leaf enclose the ball all the way, and its cones hold `normal`, if any.
-fn has_path(tree: &SplatTree, center: DVec3, radius: f64, normal: Option<DVec3>) -> bool {
+pub(super) fn has_path(tree: &SplatTree, center: DVec3, radius: f64, normal: Option<DVec3>) -> bool {
     let mut stack = vec![0u32];
     while let Some(index) = stack.pop() {
         let node = &tree.nodes[index as usize];

@@ -8,7 +8,7 @@ use gigalod::geom::{Camera, ImageSize};
 use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Kernel, Look, Picture, Renderer};
 use gigalod::runtime::residency::InlineLoader;
-use gigalod::runtime::{CutReport, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::runtime::{CutReport, Fineness, Instance, Residency, Scene, Similarity, ViewId};
 use gigalod::verify;
 use gigalod_reference::Mesh;
 use std::fs::File;
@@ -75,7 +75,7 @@ pub(crate) fn draw(
     threshold_px: f32,
     kernel: Kernel,
 ) -> (CutReport, Picture) {
-    let report = scene.select_converged(ViewId(0), camera, threshold_px);
+    let report = scene.select_converged(ViewId(0), camera, &Fineness::px(threshold_px));
     let draws = scene.draws(ViewId(0)).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
     let frame = Frame { camera: *camera, look: Look { kernel, ..Look::default() }, draws };
     (report, renderer.picture(&frame).unwrap())

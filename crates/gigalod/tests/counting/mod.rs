@@ -1,7 +1,8 @@
-//! An allocator for tests that counts: what is live, and the most that was since it was asked to forget.
+//! An allocator for tests that counts: what is live, the most that was since it was asked to forget, and how often it was asked.
 //!
 //! A test file that has `mod counting;` has it for its whole program, so it counts what all tests of the file do: they take
 //! turns with [`peak_of`].
+#![allow(dead_code, reason = "each test file uses its own part")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -11,8 +12,10 @@ struct Counting;
 
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
 fn grow(bytes: usize) {
+    ALLOCATIONS.fetch_add(1, Relaxed);
     PEAK.fetch_max(LIVE.fetch_add(bytes, Relaxed) + bytes, Relaxed);
 }
 
@@ -47,6 +50,11 @@ unsafe impl GlobalAlloc for Counting {
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
+
+/// How often memory was asked for, or asked to grow, by all threads since the program began.
+pub(crate) fn allocations() -> usize {
+    ALLOCATIONS.load(Relaxed)
+}
 
 /// What `act` allocates at most at any time, beyond what there was before. One at a time.
 pub(crate) fn peak_of<T>(act: impl FnOnce() -> T) -> (T, usize) {

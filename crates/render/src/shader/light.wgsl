@@ -1,7 +1,7 @@
 // light.wgsl: lights the G-buffer.
 //
 // Draw      one triangle that covers the picture.
-// Reads     params; albedo (alpha 0: nothing there) and normal of the pixel.
+// Reads     params; albedo (alpha: how much of the pixel is there, the rest is background) and normal of the pixel.
 // Writes    the picture, in linear light; the target encodes it as sRGB.
 // Limits    none beyond the baseline of WebGPU; depth textures are not loaded from, which OpenGL cannot.
 //
@@ -32,10 +32,13 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
         return params.background;
     }
     let from_middle = position.xy - params.size_px * 0.5;
-    let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) / params.focal_px;
+    let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) * (1.0 / params.focal_px);
     let stored = textureLoad(normal_texture, pixel, 0).xyz;
     let away = dot(stored, ray) > GRAZING * length(ray) * length(stored);
-    let normal = normalize(select(stored, -stored, away));
+    // Where normals cancelled out, the surface faces the eye.
+    let turned = select(stored, -stored, away);
+    let normal = normalize(select(-ray, turned, dot(turned, turned) > 1e-8));
     let direct = (1.0 - params.ambient) * max(dot(normal, params.towards_light.xyz), 0.0);
-    return vec4f(albedo.rgb * params.light.rgb * (params.ambient + direct), 1.0);
+    let lit = albedo.rgb * params.light.rgb * (params.ambient + direct);
+    return vec4f(params.background.rgb * (1.0 - albedo.a) + lit * albedo.a, 1.0);
 }

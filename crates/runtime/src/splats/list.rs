@@ -34,6 +34,22 @@ pub struct SplatList {
 }
 
 impl SplatPiece {
+    /// An empty piece with room for so many splats.
+    pub fn with_capacity(splats: usize) -> Self {
+        Self { balls: Vec::with_capacity(splats), normal_colors: Vec::with_capacity(splats) }
+    }
+
+    /// Splats that can be appended without asking for memory.
+    pub fn room(&self) -> usize {
+        self.balls.capacity().min(self.normal_colors.capacity()) - self.balls.len()
+    }
+
+    /// Bytes that it keeps.
+    pub fn bytes(&self) -> u64 {
+        (self.balls.capacity() * size_of::<SplatBall>() + self.normal_colors.capacity() * size_of::<NormalColor>())
+            as u64
+    }
+
     /// Appends a splat.
     pub fn push(&mut self, ball: SplatBall, normal_color: NormalColor) {
         self.balls.push(ball);
@@ -64,6 +80,12 @@ impl SplatList {
     /// All splats, in order.
     pub fn iter(&self) -> impl Iterator<Item = (&SplatBall, NormalColor)> {
         self.pieces.iter().flat_map(|piece| piece.balls.iter().zip(piece.normal_colors.iter().copied()))
+    }
+
+    /// Bytes that it keeps.
+    pub fn bytes(&self) -> u64 {
+        let own = self.pieces.capacity() * size_of::<SplatPiece>();
+        own as u64 + self.pieces.iter().map(SplatPiece::bytes).sum::<u64>()
     }
 
     /// Empties all pieces and keeps their memory.

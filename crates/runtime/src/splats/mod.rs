@@ -1,17 +1,36 @@
 //! Splats: the cut through a bounding-sphere hierarchy.
 //!
-//! Source: the splats paper, section 2.1, `TraverseHierarchy`.
+//! Source: the splats paper, section 2.1, `TraverseHierarchy`. [`plain`] is the traversal as the paper has it and judges the other one,
+//! which [`SplatSelector`] uses: four siblings at a time, on several threads, in pieces of memory that go from frame to frame.
+//! Each cut begins at the root; ARCHITECTURE.md says what refining the last one would gain (at rest a third) and cost (a fifth of
+//! every other frame, and 28 bytes a splat).
 
+mod crew;
+mod group;
+mod lanes;
 mod list;
-mod traverse;
+pub mod plain;
+mod sizes;
+mod walk;
 
 pub use list::{NormalColor, SplatBall, SplatList, SplatPiece};
-pub use traverse::{Culled, CutSink, Cutting, VisitedNode, Work, cut};
+pub use plain::Cutting;
+pub use walk::CHECK_GROUPS;
 
 use crate::residency::{PageKey, PageRequest};
-use crate::selection::{DrawSource, SelectInput, Selection, Selector, Target};
+use crate::selection::{DrawSource, Outcome, SelectInput, Selection, Selector, Target};
+use crate::{CutReport, Limit};
+use crew::Crew;
+use gigalod_format::splats::PageId;
 use gigalod_geom::color::rgb565_of_srgb8;
+use gigalod_geom::projected;
+use gigalod_geom::quantise::normal;
+use lanes::Look;
+pub(crate) use sizes::{ThresholdSearch, coarser};
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
+use std::sync::{Mutex, PoisonError};
+use walk::{BENEFIT_UNITS, Cut, Item, MOST_BENEFIT_PX, sum_up};
 
 /// Where a splat's colour comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,80 +45,256 @@ pub enum Tint {
 /// The 8-bit sRGB colour of a model without colours: warm stone, one of those that 5-6-5 holds exactly.
 pub const MATERIAL_SRGB: [u8; 3] = [197, 190, 173];
 
+/// Nodes of a target's last cut from which on the next one is worth several threads: about a millisecond of one.
+const WORTH_THREADS: u64 = 50_000;
+
+/// Chunks of work for each thread: the more, the shorter the wait for the last one.
+const CHUNKS_PER_THREAD: usize = 8;
+
+/// Groups among which chunks are cut.
+const GROUPS_PER_CHUNK: usize = 8;
+
 /// Cuts splat hierarchies on the host.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct SplatSelector {
     /// How to cut; the same picture comes out whatever is set here, slower or faster.
     pub cutting: Cutting,
     /// How to colour.
     pub tint: Tint,
-    states: BTreeMap<Target, Work>,
+    threads: usize,
+    crew: Option<Crew>,
+    /// Nodes that the last cut of a target visited.
+    visited: BTreeMap<Target, u64>,
+    // Kept so that a warm cut allocates nothing.
+    items: Vec<Item>,
+    scratch: Vec<Item>,
+    free: Vec<SplatPiece>,
+    filled: Vec<(u32, u32, SplatPiece)>,
+    wanted: Vec<(PageId, u64)>,
+}
+
+impl Default for SplatSelector {
+    /// With as many threads as the machine offers.
+    fn default() -> Self {
+        Self {
+            cutting: Cutting::default(),
+            tint: Tint::default(),
+            threads: std::thread::available_parallelism().map_or(1, |cores| cores.get()),
+            crew: None,
+            visited: BTreeMap::new(),
+            items: Vec::new(),
+            scratch: Vec::new(),
+            free: Vec::new(),
+            filled: Vec::new(),
+            wanted: Vec::new(),
+        }
+    }
+}
+
+impl SplatSelector {
+    /// Cuts with at most so many threads, the caller's among them; lists do not depend on it.
+    pub fn set_threads(&mut self, threads: usize) {
+        if threads.max(1) != self.threads {
+            self.threads = threads.max(1);
+            self.crew = None;
+        }
+    }
+
+    /// Bytes that it keeps: what its threads work with, and empty pieces of lists.
+    pub fn bytes(&self) -> u64 {
+        let workers = self.crew.as_ref().map_or(0, |crew| (0..crew.len()).map(|at| crew.worker(at).bytes()).sum());
+        let free = self.free.iter().map(SplatPiece::bytes).sum::<u64>();
+        let own = (self.items.capacity() + self.scratch.capacity()) * size_of::<Item>()
+            + self.free.capacity() * size_of::<SplatPiece>()
+            + self.filled.capacity() * size_of::<(u32, u32, SplatPiece)>()
+            + self.wanted.capacity() * size_of::<(PageId, u64)>();
+        workers + free + own as u64
+    }
+
+    /// Makes a cut, whose items are whole hierarchies, with the crew.
+    fn work(&mut self, mut cut: Cut, together: bool) -> Cut {
+        let crew = self.crew.get_or_insert_with(|| Crew::new(self.threads));
+        let together = together && crew.len() > 1;
+        cut.chunks = 1;
+        if together {
+            let chunks = crew.len() * CHUNKS_PER_THREAD;
+            let mut items = std::mem::take(&mut cut.items);
+            crew.worker(0).split(&cut, chunks * GROUPS_PER_CHUNK, &mut items, &mut self.scratch);
+            cut.chunks = chunks.min(items.len()) as u32;
+            cut.items = items;
+        }
+        crew.work(cut, together)
+    }
 }
 
 impl Selector for SplatSelector {
-    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) {
-        let mut splats = match std::mem::take(&mut out.draw) {
-            DrawSource::Splats(splats) => splats,
+    fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) -> Outcome {
+        let mut list = match std::mem::take(&mut out.draw) {
+            DrawSource::Splats(list) => list,
             DrawSource::OnDevice(_) => SplatList::default(),
         };
-        splats.clear();
-        if splats.pieces.is_empty() {
-            splats.pieces.push(SplatPiece::default());
-        }
         out.requests.clear();
-        let work = self.states.entry(target).or_default();
-        let mut sink = DrawSink { splats: &mut splats.pieces[0], requests: &mut out.requests, tint: self.tint, input };
-        out.report = cut(input, &self.cutting, work, &mut sink);
-        // Siblings ask for the same page one after the other: sum up before residency has to.
-        out.requests.sort_by_key(|request| request.key);
-        out.requests.dedup_by(|next, first| {
-            let same = next.key == first.key;
-            if same {
-                first.benefit += next.benefit;
-            }
-            same
-        });
-        out.draw = DrawSource::Splats(splats);
+        let visited = self.visited.entry(target).or_default();
+        let together = *visited >= WORTH_THREADS;
+        let mut outcome = self.cut_into(input, together, out, &mut list);
+        if out.report.inconsistent && together {
+            // Where it was cut short depends on who saw it first; alone, it is always the same place.
+            outcome = self.cut_into(input, false, out, &mut list);
+        }
+        self.visited.insert(target, out.report.visited);
+        out.draw = DrawSource::Splats(list);
+        outcome
     }
 
     fn forget(&mut self, target: Target) {
-        self.states.remove(&target);
+        self.visited.remove(&target);
     }
 }
 
-/// Collects what is drawn and what is missing.
-struct DrawSink<'a> {
-    splats: &'a mut SplatPiece,
-    requests: &'a mut Vec<PageRequest>,
-    tint: Tint,
-    input: &'a SelectInput<'a>,
-}
+impl SplatSelector {
+    /// Takes the memory of a list back, for the next ones.
+    pub(crate) fn take_back(&mut self, list: &mut SplatList) {
+        list.clear();
+        self.free.extend(list.pieces.drain(..).filter(|piece| piece.room() > 0));
+    }
 
-impl CutSink for DrawSink<'_> {
-    fn draw(&mut self, node: &VisitedNode) {
-        let color = match self.tint {
-            Tint::Model => node.color.unwrap_or(const { packed_material() }),
-            Tint::Level => level_color(node.level),
+    /// Gives memory away that the next lists will not need, unless they have grown by much: after lists of `used` pieces that
+    /// were made of the same memory, or beside it.
+    pub(crate) fn give_away(&mut self, used: usize, beside: bool) {
+        let enough = used / 4 + 2 + if beside { used } else { 0 };
+        self.free.truncate(enough);
+    }
+
+    /// Keeps a few empty pieces, so that a list that grows a little needs no memory.
+    pub(crate) fn keep_spare(&mut self, used: usize, most_splats: u64, room_bytes: u64) {
+        let piece_splats = piece_splats(most_splats);
+        let missing = (used / 16 + 1).saturating_sub(self.free.len());
+        let affordable = room_bytes / (piece_splats as u64 * SplatList::SPLAT_BYTES);
+        self.free.extend((0..missing.min(affordable as usize)).map(|_| SplatPiece::with_capacity(piece_splats)));
+    }
+
+    /// Counts a hierarchy for a budget. False where it was broken off.
+    pub(crate) fn count_into(&self, input: &SelectInput<'_>, search: &mut ThresholdSearch) -> bool {
+        let root = input.residency.file(input.file).skeleton().root();
+        let (table, frame) = input.residency.table(input.file);
+        if table.used(PageId(0), frame).is_none() {
+            search.count_root();
+            return true;
+        }
+        let look = Look::new(&input.view, root, self.cutting, input.threshold_px);
+        search.count(look, (&table, frame), root, input.interrupt)
+    }
+
+    fn cut_into(
+        &mut self,
+        input: &SelectInput<'_>,
+        together: bool,
+        out: &mut Selection,
+        list: &mut SplatList,
+    ) -> Outcome {
+        let file = input.residency.file(input.file);
+        let root = file.skeleton().root();
+        let (table, frame) = input.residency.table(input.file);
+        self.take_back(list);
+        out.report = CutReport { threshold_px: input.threshold_px, ..CutReport::default() };
+        if table.used(PageId(0), frame).is_none() {
+            list.pieces.extend(self.free.pop());
+            return draw_root(input, self.tint, out, list);
+        }
+
+        let look = Look::new(&input.view, root, self.cutting, input.threshold_px);
+        let mut items = std::mem::take(&mut self.items);
+        items.clear();
+        items.push(Item::root(root, look.known()));
+        let cut = Cut {
+            look,
+            table,
+            frame,
+            max_nodes: root.nodes,
+            tint: self.tint,
+            most_splats: input.most_splats,
+            piece_splats: piece_splats(input.most_splats),
+            interrupt: input.interrupt.clone(),
+            items,
+            chunks: 1,
+            next_chunk: AtomicU32::new(0),
+            drawn: AtomicU64::new(0),
+            stop: AtomicBool::new(false),
+            free: Mutex::new((std::mem::take(&mut self.free), input.room_bytes)),
+            no_room: AtomicBool::new(false),
+            wanted_before: self.wanted.len(),
         };
-        let ball = SplatBall { center_in_eye: node.center_in_eye.to_array(), radius: node.radius };
-        self.splats.push(ball, u32::from(node.node.normal()) | u32::from(color) << 16);
-    }
+        let cut = self.work(cut, together);
+        self.items = cut.items;
+        (self.free, _) = cut.free.into_inner().unwrap_or_else(PoisonError::into_inner);
 
-    fn miss(&mut self, page: gigalod_format::splats::PageId, benefit: f32) {
-        // Twice the threshold wanted is worth twice as much, but a node at the eye is not worth everything.
-        let benefit = benefit.min(1e6);
-        self.requests.push(PageRequest { key: PageKey { file: self.input.file, page }, benefit });
+        self.wanted.clear();
+        if let Some(crew) = &self.crew {
+            for number in 0..crew.len() {
+                let mut worker = crew.worker(number);
+                out.report = out.report.merge(worker.report);
+                self.filled.append(&mut worker.pieces);
+                self.wanted.append(&mut worker.wanted);
+            }
+        }
+        out.report.inconsistent |= out.report.visited > root.nodes;
+        self.filled.sort_unstable_by_key(|(chunk, number, _)| (*chunk, *number));
+        list.pieces.extend(self.filled.drain(..).map(|(_, _, piece)| piece));
+        sum_up(&mut self.wanted);
+        out.requests.extend(self.wanted.iter().map(|(page, benefit)| PageRequest {
+            key: PageKey { file: input.file, page: *page },
+            benefit: *benefit as f32 / BENEFIT_UNITS,
+        }));
+        if input.interrupt.is_set() {
+            Outcome::Interrupted
+        } else if cut.drawn.into_inner() > input.most_splats {
+            Outcome::TooMany
+        } else if cut.no_room.into_inner() {
+            Outcome::NoRoom
+        } else {
+            Outcome::Complete
+        }
+    }
+}
+
+/// Capacity of a new piece: large ones are handed on with less ado, small ones leave less unused where memory is tight.
+fn piece_splats(most_splats: u64) -> usize {
+    (most_splats / 128).clamp(1024, 16_384) as usize
+}
+
+/// Nothing but the skeleton to draw from: the root ball.
+fn draw_root(input: &SelectInput<'_>, tint: Tint, out: &mut Selection, list: &mut SplatList) -> Outcome {
+    let root = input.residency.file(input.file).skeleton().root();
+    let [high, low] = input.view.eye_in_local(root.origin);
+    let center = root.sphere.center - high - low;
+    let radius = root.sphere.radius;
+    let depth = center.dot(input.view.forward);
+    let px = projected::diameter_px(depth, center.length_squared(), radius, input.view.focal_px);
+    let key = PageKey { file: input.file, page: PageId(0) };
+    out.requests.push(PageRequest { key, benefit: px.min(MOST_BENEFIT_PX) });
+    out.report.drew(px, Some(Limit::Residency));
+    if list.pieces.is_empty() {
+        list.pieces.push(SplatPiece::with_capacity(1));
+    }
+    // The skeleton has no normal for it: it faces whoever looks.
+    let facing = u32::from(normal::encode(-center));
+    let color = if tint == Tint::Level { level_color(0) } else { packed_material() };
+    list.pieces[0].push(SplatBall { center_in_eye: center.to_array(), radius }, facing | u32::from(color) << 16);
+    match input.interrupt.is_set() {
+        true => Outcome::Interrupted,
+        false if input.most_splats == 0 => Outcome::TooMany,
+        false => Outcome::Complete,
     }
 }
 
 /// [`MATERIAL_SRGB`] in 5-6-5.
-const fn packed_material() -> u16 {
+pub(crate) const fn packed_material() -> u16 {
     let [r, g, b] = MATERIAL_SRGB;
     ((r as u16 * 31 + 127) / 255) << 11 | ((g as u16 * 63 + 127) / 255) << 5 | ((b as u16 * 31 + 127) / 255)
 }
 
 /// Colours that differ from one level to the next and still tell coarse from fine.
-fn level_color(level: u32) -> u16 {
+pub(crate) fn level_color(level: u32) -> u16 {
     const CIRCLE: [[u8; 3]; 12] = [
         [230, 60, 50],
         [235, 130, 40],

@@ -1,6 +1,8 @@
 //! A small closed statue as a splat file, and scenes of it.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub(crate) mod judge;
+
 use gigalod_build::{NoProgress, Options, splats};
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, MemoryStore};
@@ -15,16 +17,24 @@ use std::sync::{Arc, OnceLock};
 /// Bytes of the file: 60,000 triangles, several pages.
 pub(crate) fn statue_bytes() -> &'static [u8] {
     static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
-    BYTES.get_or_init(|| {
-        let mut ply = Vec::new();
-        let options = StatueOptions { triangles: 60_000, seed: 3, colors: true, order: Order::Coherent };
-        write_statue(options, &mut ply, &mut |_, _| {}).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("statue.glod");
-        let stream = gigalod_import::open(Box::new(Cursor::new(ply))).unwrap();
-        splats::build(stream, &Options::default(), &NoProgress, &out).unwrap();
-        std::fs::read(out).unwrap()
-    })
+    BYTES.get_or_init(|| bytes_of(statue_ply(60_000, true)))
+}
+
+/// A closed statue as PLY.
+pub(crate) fn statue_ply(triangles: u64, colors: bool) -> Vec<u8> {
+    let mut ply = Vec::new();
+    write_statue(StatueOptions { triangles, seed: 3, colors, order: Order::Coherent }, &mut ply, &mut |_, _| {})
+        .unwrap();
+    ply
+}
+
+/// What becomes of a PLY file.
+pub(crate) fn bytes_of(ply: Vec<u8>) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("model.glod");
+    let stream = gigalod_import::open(Box::new(Cursor::new(ply))).unwrap();
+    splats::build(stream, &Options::default(), &NoProgress, &out).unwrap();
+    std::fs::read(out).unwrap()
 }
 
 pub(crate) fn open(bytes: Vec<u8>) -> Arc<SplatFile> {

@@ -183,7 +183,7 @@ impl Model {
     ///
     /// # Errors
     /// [`FormatError::Invalid`] where the bytes end early or late, a symbol occurs that cannot, or frequencies do not sum to
-    /// 1024.
+    /// 512.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
         let mut rest = bytes.iter().copied();
         let mut byte = || {
@@ -217,7 +217,7 @@ impl Model {
                     if low < 128 { low } else { low - 128 + (u32::from(byte()?) << 7) }
                 };
                 if value == 0 || value > left {
-                    let problem = format!("context {context} has frequencies that sum to more than 1024, or one of 0");
+                    let problem = format!("context {context} has frequencies that sum to more than 512, or one of 0");
                     return Err(FormatError::invalid("the model", problem));
                 }
                 left -= value;

@@ -1,4 +1,4 @@
-//! A static range coder over small alphabets: rANS with 10-bit probabilities and 16-bit words.
+//! A static range coder over small alphabets: rANS with 9-bit probabilities and 16-bit words.
 //!
 //! Each symbol is coded under one of many [`Table`]s. A page has several lanes, each with its own [`State`], so that a processor can
 //! work on all at once; they share [`Words`]. The coder works backwards, so the decoder reads forwards.
@@ -11,8 +11,9 @@
 
 use super::model::{CONTEXTS, STORED};
 
-/// Bits of a probability.
-pub(super) const SCALE_BITS: u32 = 10;
+/// Bits of a probability. What a decoder looks up must stay in a processor's nearest cache: with 10 bits it is a tenth slower, and files
+/// are 0.2 % smaller.
+pub(super) const SCALE_BITS: u32 = 9;
 /// The whole.
 pub(super) const SCALE: u32 = 1 << SCALE_BITS;
 /// Most symbols of an alphabet.
@@ -90,7 +91,7 @@ impl Table {
 /// What a decoder looks up.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
-    /// By 1024 · context + slot: a byte each, so that what is in use fits a processor's cache.
+    /// By 512 · context + slot: a byte each, so that what is in use fits a processor's cache.
     symbols: Box<[u8; CONTEXTS * SCALE as usize]>,
     /// By 16 · context + symbol: `frequency << 16 | start`.
     shares: Box<[u32; CONTEXTS * ROW]>,
@@ -203,7 +204,7 @@ struct Entry {
     /// 2^64 / frequency, rounded up: with it ⌊x / frequency⌋ is exact for every state. For a frequency of 1 one less than that, so
     /// x − 1 takes its place, and `bias` makes up for it.
     reciprocal: u64,
-    /// From here on, in 2^22, the state must lose a word before.
+    /// From here on, in units of 2^22, the state must lose a word before.
     full: u16,
     steps: u16,
     bias: u32,
@@ -216,13 +217,14 @@ impl Entry {
             1 => (u64::MAX, start + scale - 1),
             _ => (u64::MAX / u64::from(frequency) + 1, start),
         };
-        let full = ((u64::from(frequency) << 32) / u64::from(scale)) >> (32 - SCALE_BITS);
+        let full = ((u64::from(frequency) << 32) / u64::from(scale)) >> (32 - MOST_BITS);
         Self { reciprocal, full: full as u16, steps: (scale - frequency) as u16, bias }
     }
 }
 
-/// Most bits of a number that is coded as it is.
+/// Most bits of a number that is coded as it is; no probability has more.
 const MOST_BITS: u32 = 10;
+const _: () = assert!(SCALE_BITS <= MOST_BITS);
 /// Entries of such numbers, by [`entry_of_bits`].
 const FIRST_OF_BITS: usize = (CONTEXTS - 1) * ROW - (2 << MOST_BITS);
 const _: () = assert!(STORED * ROW <= FIRST_OF_BITS);
@@ -273,7 +275,7 @@ impl<'a> Coder<'a> {
     #[inline(always)]
     pub(super) fn put(&mut self, state: &mut State, symbol: u16) {
         let entry = &self.entries.0[usize::from(symbol) & (CONTEXTS * ROW - 1)];
-        let full = state.0 >> (32 - SCALE_BITS) >= u32::from(entry.full);
+        let full = state.0 >> (32 - MOST_BITS) >= u32::from(entry.full);
         if let Some(word) = self.words.get_mut(self.at) {
             *word = state.0 as u16;
         }

@@ -1,4 +1,7 @@
-//! The traversal: from the root down to what is small enough on screen.
+//! The traversal as one would write it down: from the root to what is small enough on screen, one node after the other.
+//!
+//! The judge of the fast one: [`super::SplatSelector`] gives the same splats in the same order and the same report, which tests
+//! hold against this. It also says of each node why it is left out, which nobody needs who only draws.
 //!
 //! Work goes by groups of siblings, because a group shares one pointer. A group on the stack knows its parent's decoded
 //! sphere, from which its own are decoded on the way; the stack is explicit, so that the depth of a hostile tree costs no
@@ -99,7 +102,7 @@ pub fn cut(input: &SelectInput<'_>, cutting: &Cutting, work: &mut Work, sink: &m
     let residency = input.residency;
     let file = residency.file(input.file).clone();
     let root = file.skeleton().root();
-    let mut report = CutReport::default();
+    let mut report = CutReport { threshold_px: input.threshold_px, ..CutReport::default() };
     if residency.page(input.file, PageId(0)).is_none() {
         // Nothing but the skeleton to draw from: the root ball.
         let [high, low] = input.view.eye_in_local(root.origin);
@@ -151,10 +154,13 @@ pub fn cut(input: &SelectInput<'_>, cutting: &Cutting, work: &mut Work, sink: &m
         away: false,
     });
     while let Some(group) = work.stack.pop() {
+        let below = work.stack.len();
         if !traversal.visit(&group, &mut work.stack, sink) {
             traversal.report.inconsistent = true;
             break;
         }
+        // So that the first is visited first.
+        work.stack[below..].reverse();
     }
     traversal.report
 }

@@ -1,10 +1,13 @@
 //! Instances of models, and the frame that brings selectors and residency together.
 
+mod budget;
+
 use crate::residency::{FileId, PageRequest, Residency};
-use crate::selection::{SelectInput, Selection, Selector, Target};
-use crate::{CutReport, InstanceId, ModelView, Similarity, SplatSelector, ViewId};
+use crate::selection::{Selection, Target};
+use crate::splats::ThresholdSearch;
+use crate::{CutReport, Fineness, InstanceId, Interrupt, Similarity, SplatSelector, ViewId};
 use gigalod_geom::{Aabb, Camera};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One placement of one file.
 #[derive(Clone, Copy, Debug)]
@@ -15,25 +18,31 @@ pub struct Instance {
     pub placement: Similarity,
 }
 
-/// How fine a view is wanted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fineness {
-    /// Largest error on screen, in pixels; 0 for everything there is.
-    pub threshold_px: f32,
-    /// Most splats, over all instances; a cut that would have more is made coarser.
-    pub most_splats: u64,
-}
-
 /// Models in their places.
 #[derive(Debug)]
 pub struct Scene {
     residency: Residency,
     instances: BTreeMap<InstanceId, Instance>,
     splats: SplatSelector,
-    /// What the last [`Scene::select`] of each target answered; kept so that buffers are reused.
-    selections: BTreeMap<Target, Selection>,
+    /// What cuts answered; kept so that buffers are reused.
+    lists: BTreeMap<Target, Lists>,
     /// Of all targets since the last [`Scene::serve`].
     requests: Vec<PageRequest>,
+    /// For pages, lists, and all else that the scene keeps.
+    cpu_budget: u64,
+    search: ThresholdSearch,
+    /// Views whose last cut had a raised threshold.
+    limited: BTreeSet<ViewId>,
+    never: Interrupt,
+}
+
+/// Of one target.
+#[derive(Debug, Default)]
+struct Lists {
+    /// The last complete cut.
+    shown: Selection,
+    /// The one being made, where the last must stay meanwhile.
+    next: Selection,
 }
 
 impl Scene {
@@ -43,8 +52,12 @@ impl Scene {
             residency,
             instances: BTreeMap::new(),
             splats: SplatSelector::default(),
-            selections: BTreeMap::new(),
+            lists: BTreeMap::new(),
             requests: Vec::new(),
+            cpu_budget: u64::MAX,
+            search: ThresholdSearch::new(),
+            limited: BTreeSet::new(),
+            never: Interrupt::default(),
         }
     }
 
@@ -80,44 +93,66 @@ impl Scene {
         Aabb::of(corners)
     }
 
+    /// Bounds all that the scene keeps: lists take at most half of it, pages what lists leave.
+    pub fn set_cpu_budget(&mut self, bytes: u64) {
+        self.cpu_budget = bytes;
+        for lists in self.lists.values_mut() {
+            self.splats.take_back(lists.shown.splats_mut());
+            self.splats.take_back(lists.next.splats_mut());
+        }
+        self.splats.give_away(0, false);
+        self.leave_the_rest_to_pages();
+    }
+
+    /// Bytes that the scene keeps: pages, lists, and what it works with.
+    pub fn cpu_bytes(&self) -> u64 {
+        self.residency.taken_bytes() + self.bytes_besides_pages()
+    }
+
     /// Cuts all hierarchies for one view; the requests wait for [`Scene::serve`].
-    pub fn select(&mut self, view: ViewId, camera: &Camera, threshold_px: f32) -> CutReport {
-        let mut report = CutReport::default();
-        for (instance, Instance { file, placement }) in &self.instances {
-            let target = Target { instance: *instance, view };
-            let input = SelectInput {
-                file: *file,
-                view: ModelView::new(camera, placement),
-                threshold_px,
-                residency: &self.residency,
-            };
-            let selection = self.selections.entry(target).or_default();
-            self.splats.select(target, &input, selection);
-            self.requests.extend_from_slice(&selection.requests);
-            report = report.merge(selection.report);
+    pub fn select(&mut self, view: ViewId, camera: &Camera, fineness: &Fineness) -> CutReport {
+        let never = self.never.clone();
+        self.cut(view, camera, fineness, &never, false).expect("nobody has the interrupt")
+    }
+
+    /// The same, but may be broken off; then there is no report, and the last complete cut of the view stays what is drawn.
+    pub fn select_interruptible(
+        &mut self,
+        view: ViewId,
+        camera: &Camera,
+        fineness: &Fineness,
+        interrupt: &Interrupt,
+    ) -> Option<CutReport> {
+        let report = self.cut(view, camera, fineness, interrupt, true);
+        if report.is_none() {
+            // What is still shown still wants its pages.
+            for lists in self.lists.iter().filter(|(target, _)| target.view == view).map(|(_, lists)| lists) {
+                self.requests.extend_from_slice(&lists.shown.requests);
+            }
         }
         report
     }
 
     /// What the last cut of `view` draws.
     pub fn draws(&self, view: ViewId) -> impl Iterator<Item = (&Instance, &Selection)> {
-        self.selections
+        self.lists
             .iter()
             .filter(move |(target, _)| target.view == view)
-            .filter_map(|(target, selection)| Some((self.instances.get(&target.instance)?, selection)))
+            .filter_map(|(target, lists)| Some((self.instances.get(&target.instance)?, &lists.shown)))
     }
 
     /// Ends the frame: hands the union of all views' requests to residency.
     pub fn serve(&mut self) {
         self.residency.serve(&self.requests);
         self.requests.clear();
+        self.leave_the_rest_to_pages();
     }
 
     /// Selects, serves and waits until the view is as fine as was asked for, or cannot get finer. For pictures, not frames:
     /// this one waits for loads.
-    pub fn select_converged(&mut self, view: ViewId, camera: &Camera, threshold_px: f32) -> CutReport {
+    pub fn select_converged(&mut self, view: ViewId, camera: &Camera, fineness: &Fineness) -> CutReport {
         loop {
-            let report = self.select(view, camera, threshold_px);
+            let report = self.select(view, camera, fineness);
             self.serve();
             if !self.residency.is_loading() {
                 return report;

@@ -1,0 +1,41 @@
+// Depths as whole numbers: the nearer, the larger; 0 stands for nothing at all. Depths are positive, so their bits are ordered
+// as they are, and the highest bit is free.
+
+struct Splat {
+    shape: Shape,
+    // Its place among all splats of the frame.
+    number: u32,
+    // Linear light, and world space, turned towards the eye: only where `blends()`.
+    albedo: vec3f,
+    normal: vec3f,
+}
+
+fn nearness_of(z: f32) -> u32 {
+    return 0x7fffffffu - bitcast<u32>(z);
+}
+
+fn depth_of(nearness: u32) -> f32 {
+    return bitcast<f32>(0x7fffffffu - (nearness & 0x7fffffffu));
+}
+
+// True where what a splat looks like is needed while it is drawn, not after.
+fn blends() -> bool {
+    return is_gauss() && frame.phase == 1u;
+}
+
+fn splat_of(part: PartParams, ball: vec4f, normal_color: u32, number: u32) -> Splat {
+    var out: Splat;
+    out.shape = shape_of(part, ball, normal_color & 0x3fffu);
+    out.number = number;
+    if blends() {
+        out.albedo = color_of(normal_color >> 16u);
+        let normal = normal_of(normal_color & 0x3fffu);
+        let away = dot(normal, ball.xyz) > GRAZING_TURN * length(ball.xyz);
+        let turned = select(normal, -normal, away);
+        out.normal = part.model_x.xyz * turned.x + part.model_y.xyz * turned.y + part.model_z.xyz * turned.z;
+    }
+    return out;
+}
+
+// Sine of the angle from which on a normal that points away is turned before it is blended; as GRAZING in light.wgsl.
+const GRAZING_TURN: f32 = 0.25;

@@ -1,0 +1,429 @@
+//! Splats through keys: what is nearest in each pixel is found by atomic maxima in a storage buffer, then written to the
+//! G-buffer. Shaders: `shader/splat_compute.wgsl`, `splat_quads.wgsl`, `splat_resolve.wgsl`, `splat_blend.wgsl`.
+//!
+//! A splat of a few pixels costs a pipeline far more than its pixels are worth, so a compute pass draws it; one of many pixels
+//! would keep a single invocation busy, so it is listed and drawn as a quad. Both deliver the same bits to the same place, and
+//! maxima and sums of whole numbers do not depend on the order: which way a splat takes is never to be seen.
+//!
+//! A picture whose keys do not fit into one binding is drawn in bands of rows.
+
+use crate::Gpu;
+use crate::gbuffer::{self, GBuffer};
+use crate::memory::Pool;
+use crate::shader::{self, Target};
+use crate::splats::params::{PartParams, PassParams, STRIDE};
+use crate::splats::store::{self, Chunk, Plan};
+use crate::splats::{BLEND, COMPUTE, Kernel, QUADS, RESOLVE};
+use gigalod_geom::{Camera, ImageSize};
+use std::collections::BTreeMap;
+
+/// Splats whose window is at most this many pixels wide and high are drawn by the compute pass, unless
+/// [`crate::Renderer::set_compute_extent`] says otherwise. Measured.
+pub(crate) const COMPUTE_EXTENT_PX: u32 = 16;
+
+/// Beyond this an invocation of the compute pass would take too many turns: the software adapter ends all loops of an invocation
+/// after 65,535 turns in all, and draws 16 splats in one.
+pub(crate) const MOST_COMPUTE_EXTENT_PX: u32 = 60;
+
+/// Bytes of a key, and of a pixel's sums.
+const KEY_BYTES: u64 = 8;
+const SUMS_BYTES: u64 = 40;
+
+/// Bytes of a large splat in the list.
+pub(crate) const LISTED_BYTES: u64 = 4;
+
+/// `ROW` of splat_compute.wgsl, and splats that a workgroup draws.
+const GROUPS_IN_ROW: u32 = 1 << 15;
+const SPLATS_IN_GROUP: u32 = 64 * 16;
+
+/// How a frame is cut up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Bands {
+    rows: u32,
+    count: u32,
+    height: u32,
+    width: u32,
+}
+
+impl Bands {
+    /// As few as bindings of `most_bytes` allow.
+    pub(crate) fn new(size: ImageSize, kernel: Kernel, most_bytes: u64) -> Self {
+        let row_bytes = u64::from(size.width) * if kernel.is_gauss() { SUMS_BYTES } else { KEY_BYTES };
+        let rows = (most_bytes / row_bytes).clamp(1, u64::from(size.height)) as u32;
+        Self { rows, count: size.height.div_ceil(rows), height: size.height, width: size.width }
+    }
+
+    /// Bytes of keys and of sums.
+    pub(crate) fn bytes(&self, kernel: Kernel) -> [u64; 2] {
+        let pixels = u64::from(self.width) * u64::from(self.rows);
+        [pixels * KEY_BYTES, if kernel.is_gauss() { pixels * SUMS_BYTES } else { 0 }]
+    }
+
+    fn rows_of(&self, band: u32) -> std::ops::Range<u32> {
+        band * self.rows..((band + 1) * self.rows).min(self.height)
+    }
+}
+
+/// Buffers besides the splats.
+#[derive(Debug)]
+pub(crate) struct KeyedBuffers {
+    pub(crate) keys: Pool,
+    pub(crate) sums: Pool,
+    pub(crate) list: Pool,
+    pub(crate) draw: Pool,
+}
+
+impl KeyedBuffers {
+    pub(crate) fn new() -> Self {
+        use wgpu::BufferUsages as Usage;
+        Self {
+            keys: Pool::new("keys", Usage::STORAGE),
+            sums: Pool::new("sums", Usage::STORAGE),
+            list: Pool::new("large splats", Usage::STORAGE),
+            draw: Pool::new("draw of large splats", Usage::STORAGE | Usage::INDIRECT),
+        }
+    }
+
+    /// Asks for room.
+    pub(crate) fn want(&mut self, bands: &Bands, kernel: Kernel, most_in_chunk: u64) {
+        [self.keys.wanted, self.sums.wanted] = bands.bytes(kernel);
+        // All of a chunk may be large.
+        self.list.wanted = most_in_chunk.max(1) * LISTED_BYTES;
+        self.draw.wanted = 16;
+    }
+}
+
+/// The passes of a kernel.
+#[derive(Debug)]
+struct Pipelines {
+    compute: wgpu::ComputePipeline,
+    quads: wgpu::RenderPipeline,
+    resolve: wgpu::RenderPipeline,
+    layouts: [wgpu::BindGroupLayout; 3],
+}
+
+/// Draws splats through keys.
+#[derive(Debug, Default)]
+pub(crate) struct KeyedPass {
+    /// By kernel, and whether chunks have several parts.
+    pipelines: BTreeMap<(Kernel, bool), Pipelines>,
+}
+
+/// What a frame draws with.
+pub(crate) struct KeyedFrame<'a> {
+    pub(crate) kernel: Kernel,
+    pub(crate) bands: Bands,
+    pub(crate) plan: &'a Plan,
+    pub(crate) chunks: &'a [Chunk],
+    pub(crate) passes: &'a Pool,
+    pub(crate) parts: &'a Pool,
+    pub(crate) buffers: &'a KeyedBuffers,
+}
+
+/// Blending needs the nearest depth first; keys of 32 bits find depth and number one after the other.
+fn phases(gpu: &Gpu, kernel: Kernel) -> u32 {
+    if target(gpu, kernel) == Target::Keys64 { 1 } else { 2 }
+}
+
+fn target(gpu: &Gpu, kernel: Kernel) -> Target {
+    match (kernel.is_gauss(), gpu.has_wide_keys()) {
+        (true, _) => Target::Sums,
+        (false, true) => Target::Keys64,
+        (false, false) => Target::Keys32,
+    }
+}
+
+/// The contents of the buffer of passes: all parameters, and last what a draw of large splats begins with.
+pub(crate) fn pass_bytes(
+    gpu: &Gpu,
+    camera: &Camera,
+    kernel: Kernel,
+    bands: &Bands,
+    plan: &Plan,
+    compute_extent_px: u32,
+    wants_footprint: bool,
+) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for band in 0..bands.count {
+        let rows = bands.rows_of(band);
+        for phase in 0..phases(gpu, kernel) {
+            for (parts, splats) in &plan.chunks {
+                let params = PassParams {
+                    first_row: rows.start,
+                    end_row: rows.end,
+                    phase,
+                    compute_extent_px,
+                    first_part: parts.start,
+                    part_count: parts.end - parts.start,
+                    chunk_count: *splats as u32,
+                    wants_footprint: u32::from(wants_footprint),
+                    ..PassParams::new(camera)
+                };
+                bytes.extend_from_slice(bytemuck::bytes_of(&params));
+                bytes.resize(bytes.len().next_multiple_of(STRIDE as usize), 0);
+            }
+        }
+    }
+    bytes.extend_from_slice(bytemuck::cast_slice(&[4u32, 0, 0, 0]));
+    bytes
+}
+
+impl KeyedPass {
+    /// Compiles the passes of a kernel, once.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, kernel: Kernel, plan: &Plan) {
+        let many_parts = plan.has_many_parts();
+        self.pipelines.entry((kernel, many_parts)).or_insert_with(|| Pipelines::new(gpu, kernel, many_parts));
+    }
+
+    /// Draws all splats of a frame into a G-buffer, which it clears. The kernel has been prepared, and there is a splat.
+    pub(crate) fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        gbuffer: &GBuffer,
+        frame: &KeyedFrame<'_>,
+    ) {
+        let pipelines = &self.pipelines[&(frame.kernel, frame.plan.has_many_parts())];
+        let bound: Vec<[wgpu::BindGroup; 3]> =
+            frame.chunks.iter().map(|chunk| pipelines.bind(gpu, frame, chunk)).collect();
+        let chunks = frame.chunks.len() as u32;
+        let phases = phases(gpu, frame.kernel);
+        let pass_at = |band: u32, phase: u32, chunk: u32| (band * phases + phase) * chunks + chunk;
+        let draw_template = u64::from(pass_at(frame.bands.count, 0, 0)) * STRIDE;
+        let offset = |index: u32| index * STRIDE as u32;
+        let depth_test = gbuffer::view(&gbuffer.depth_test);
+        for band in 0..frame.bands.count {
+            let rows = frame.bands.rows_of(band);
+            let [keys, sums] = frame.bands.bytes(frame.kernel);
+            encoder.clear_buffer(frame.buffers.keys.buffer(), 0, Some(keys));
+            if sums > 0 {
+                encoder.clear_buffer(frame.buffers.sums.buffer(), 0, Some(sums));
+            }
+            for (phase, chunk) in (0..phases).flat_map(|phase| (0..chunks).map(move |chunk| (phase, chunk))) {
+                let draw = frame.buffers.draw.buffer();
+                encoder.copy_buffer_to_buffer(frame.passes.buffer(), draw_template, draw, 0, 16);
+                let pass_offset = offset(pass_at(band, phase, chunk));
+                let [for_compute, for_quads, _] = &bound[chunk as usize];
+                let parts = frame.chunks[chunk as usize].parts.clone();
+                {
+                    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                        label: Some("small splats"),
+                        ..Default::default()
+                    });
+                    pass.set_pipeline(&pipelines.compute);
+                    for part in parts {
+                        let groups = frame.plan.parts[part as usize].count.div_ceil(SPLATS_IN_GROUP);
+                        pass.set_bind_group(0, for_compute, &[pass_offset, offset(part)]);
+                        pass.dispatch_workgroups(groups.min(GROUPS_IN_ROW), groups.div_ceil(GROUPS_IN_ROW), 1);
+                    }
+                }
+                // A pass must have an attachment; this one is not touched.
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("large splats"),
+                    depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                        view: &depth_test,
+                        depth_ops: None,
+                        stencil_ops: None,
+                    }),
+                    ..Default::default()
+                });
+                pass.set_pipeline(&pipelines.quads);
+                pass.set_bind_group(0, for_quads, &[pass_offset]);
+                pass.draw_indirect(draw, 0);
+            }
+            let mut pass = gbuffer.begin(encoder, band == 0);
+            pass.set_pipeline(&pipelines.resolve);
+            pass.set_scissor_rect(0, rows.start, frame.bands.width, rows.end - rows.start);
+            // Sums are of all chunks.
+            let resolved = if frame.kernel.is_gauss() { 1 } else { chunks };
+            for chunk in 0..resolved {
+                let offsets = [offset(pass_at(band, 0, chunk)), offset(frame.chunks[chunk as usize].parts.start)];
+                let offsets = if frame.kernel.is_gauss() { &offsets[..1] } else { &offsets[..] };
+                pass.set_bind_group(0, &bound[chunk as usize][2], offsets);
+                pass.draw(0..3, 0..1);
+            }
+        }
+    }
+}
+
+/// Bindings of the three passes: number, stages, whether it is written.
+const UNIFORMS: [(u32, u64); 2] = [(0, size_of::<PassParams>() as u64), (1, size_of::<PartParams>() as u64)];
+
+impl Pipelines {
+    fn new(gpu: &Gpu, kernel: Kernel, many_parts: bool) -> Self {
+        let device = &gpu.device;
+        let target = target(gpu, kernel);
+        let set = |value: bool| f64::from(u8::from(value));
+        // A pass may be given only what it declares.
+        let of_kernel = ("kernel", kernel.code());
+        let mut drawing = vec![of_kernel];
+        if target == Target::Keys64 {
+            drawing.push(("reads_first", set(!gpu.is_software())));
+        }
+        let mut resolving = vec![of_kernel];
+        if !kernel.is_gauss() {
+            resolving.push(("many_parts", set(many_parts)));
+        }
+        let options =
+            |constants| wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: true };
+        let gauss = kernel.is_gauss();
+        let (both, vertex, fragment, compute) = (
+            wgpu::ShaderStages::VERTEX_FRAGMENT,
+            wgpu::ShaderStages::VERTEX,
+            wgpu::ShaderStages::FRAGMENT,
+            wgpu::ShaderStages::COMPUTE,
+        );
+        let read = |binding, stages| (binding, stages, true);
+        let write = |binding, stages| (binding, stages, false);
+        let with_sums = |mut entries: Vec<_>, entry| {
+            if gauss {
+                entries.push(entry);
+            }
+            entries
+        };
+        let layout = |label, uniforms: usize, stages, textures: bool, storage: &[(u32, wgpu::ShaderStages, bool)]| {
+            let buffer = |binding, visibility, ty, has_dynamic_offset, bytes| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility,
+                ty: wgpu::BindingType::Buffer {
+                    ty,
+                    has_dynamic_offset,
+                    min_binding_size: std::num::NonZeroU64::new(bytes),
+                },
+                count: None,
+            };
+            let uniforms = UNIFORMS[..uniforms]
+                .iter()
+                .map(|(binding, bytes)| buffer(*binding, stages, wgpu::BufferBindingType::Uniform, true, *bytes));
+            let storage = storage.iter().map(|(binding, stages, read_only)| {
+                buffer(*binding, *stages, wgpu::BufferBindingType::Storage { read_only: *read_only }, false, 0)
+            });
+            let textures = [2, 3].into_iter().filter(|_| textures);
+            let textures = textures.map(|binding| store::layout_entry(binding, stages));
+            let entries: Vec<_> = uniforms.chain(storage).chain(textures).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        let for_compute = [write(4, compute), write(6, compute), write(7, compute)];
+        let for_quads = [write(4, fragment), read(6, vertex), read(8, vertex)];
+        let for_resolve: &[_] =
+            if gauss { &[read(4, fragment), read(5, fragment)] } else { &[read(4, fragment), read(8, fragment)] };
+        let layouts = [
+            layout("small splats", 2, compute, true, &with_sums(for_compute.to_vec(), write(5, compute))),
+            layout("large splats", 1, both, true, &with_sums(for_quads.to_vec(), write(5, fragment))),
+            layout("resolved splats", if gauss { 1 } else { 2 }, fragment, !gauss, for_resolve),
+        ];
+        let [compute_layout, quads_layout, resolve_layout] = [0, 1, 2].map(|at: usize| {
+            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: None,
+                bind_group_layouts: &[Some(&layouts[at])],
+                immediate_size: 0,
+            })
+        });
+        let module = |label, source, target| shader::module(device, label, source, target);
+        let compute = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("small splats"),
+            layout: Some(&compute_layout),
+            module: &module("splat_compute.wgsl", COMPUTE, target),
+            entry_point: Some("draw_small"),
+            compilation_options: options(&drawing),
+            cache: None,
+        });
+        let quads_module = module("splat_quads.wgsl", QUADS, target);
+        let quads = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("large splats"),
+            layout: Some(&quads_layout),
+            vertex: wgpu::VertexState {
+                module: &quads_module,
+                entry_point: Some("place"),
+                compilation_options: options(&drawing),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
+            depth_stencil: Some(gbuffer::depth_state(wgpu::CompareFunction::Always, false)),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &quads_module,
+                entry_point: Some("cover"),
+                compilation_options: options(&drawing),
+                targets: &[],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        let resolve_module = if gauss {
+            module("splat_blend.wgsl", BLEND, Target::None)
+        } else {
+            module("splat_resolve.wgsl", RESOLVE, Target::None)
+        };
+        let resolve = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("resolved splats"),
+            layout: Some(&resolve_layout),
+            vertex: wgpu::VertexState {
+                module: &resolve_module,
+                entry_point: Some("cover_picture"),
+                compilation_options: options(&resolving),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: Some(gbuffer::depth_state(wgpu::CompareFunction::GreaterEqual, true)),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &resolve_module,
+                entry_point: Some("resolve"),
+                compilation_options: options(&resolving),
+                targets: &gbuffer::COLOR_TARGETS,
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { compute, quads, resolve, layouts }
+    }
+
+    /// Bind groups of the three passes for a chunk.
+    fn bind(&self, gpu: &Gpu, frame: &KeyedFrame<'_>, chunk: &Chunk) -> [wgpu::BindGroup; 3] {
+        let KeyedFrame { passes, parts, buffers, .. } = frame;
+        let gauss = frame.kernel.is_gauss();
+        let sums = gauss.then(|| buffers.sums.entry(5));
+        let group = |at: usize, entries: Vec<wgpu::BindGroupEntry<'_>>| {
+            let entries: Vec<_> = entries.into_iter().chain(sums.clone()).collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.layouts[at],
+                entries: &entries,
+            })
+        };
+        let (pass, part) = (passes.entry_of::<PassParams>(0), parts.entry_of::<PartParams>(1));
+        let (keys, list, draw) = (buffers.keys.entry(4), buffers.list.entry(6), buffers.draw.entry(7));
+        let drawn = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3), keys.clone()];
+        let all_parts = parts.entry(8);
+        let resolved = if gauss { vec![pass, keys] } else { [&drawn[..], &[part.clone(), all_parts.clone()]].concat() };
+        [
+            group(0, [&drawn[..], &[part, list.clone(), draw]].concat()),
+            group(1, [&drawn[..], &[all_parts, list]].concat()),
+            group(2, resolved),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_all_rows_and_fit_into_a_binding() {
+        for (width, height) in [(1, 1), (640, 360), (16384, 16384), (3, 7)] {
+            let size = ImageSize { width, height };
+            for kernel in [Kernel::Round, Kernel::Gauss] {
+                let bands = Bands::new(size, kernel, 1 << 20);
+                let mut next = 0;
+                for band in 0..bands.count {
+                    let rows = bands.rows_of(band);
+                    assert!(rows.start == next && rows.end > next);
+                    next = rows.end;
+                }
+                assert_eq!(next, height);
+                assert!(bands.bytes(kernel).into_iter().all(|bytes| bytes <= 1 << 20));
+            }
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Cuts within budgets: of splats, of memory.
+//!
+//! In: what is asked for. Out: the cut at the threshold asked for, or at the first one above it that fits.
+//! What always holds: a view's instances are cut at one threshold; the last complete cut stays until the next one is, where that is
+//! asked for; the threshold depends on the camera, the budgets and what is resident, not on the frames before.
+
+use super::{Instance, Lists, Scene};
+use crate::residency::PageRequest;
+use crate::selection::{Outcome, SelectInput, Selector, Target};
+use crate::splats::{SplatList, coarser};
+use crate::{CutReport, Fineness, Interrupt, Limit, ModelView, ViewId};
+use gigalod_geom::Camera;
+
+/// Lists grow by at least so much at a time.
+const LEAST_GROWTH_BYTES: u64 = 64 << 10;
+
+impl Scene {
+    /// A cut of all instances. With `beside`, the last one stays where it is until this one is complete.
+    pub(super) fn cut(
+        &mut self,
+        view: ViewId,
+        camera: &Camera,
+        fineness: &Fineness,
+        interrupt: &Interrupt,
+        beside: bool,
+    ) -> Option<CutReport> {
+        for instance in self.instances.keys() {
+            self.lists.entry(Target { instance: *instance, view }).or_default();
+        }
+        let asked_px = fineness.threshold_px;
+        let most_splats = fineness.most_splats.min(self.most_splats_in_memory());
+        let mut threshold_px = asked_px;
+        // The search begins as the cut does, so it may come first where the cut will probably be in vain.
+        let mut searched = self.limited.contains(&view);
+        if searched {
+            threshold_px = self.threshold_within(camera, asked_px, most_splats, interrupt)?;
+        }
+        let mut report = loop {
+            match self.cut_at(view, camera, threshold_px, most_splats, interrupt, beside) {
+                Ok(report) => break report,
+                Err(Outcome::TooMany) if !searched => {
+                    searched = true;
+                    threshold_px = self.threshold_within(camera, asked_px, most_splats, interrupt)?;
+                }
+                Err(Outcome::NoRoom) if self.make_room_for_lists() => {}
+                Err(Outcome::TooMany | Outcome::NoRoom) => threshold_px = coarser(threshold_px),
+                Err(_) => return None,
+            }
+        };
+        if threshold_px > asked_px {
+            self.limited.insert(view);
+        } else {
+            self.limited.remove(&view);
+        }
+        let limit = |report: &mut CutReport| {
+            if threshold_px > asked_px && report.max_error_px > asked_px {
+                report.limited_by = Some(Limit::Budget);
+            }
+        };
+        limit(&mut report);
+        let mut used = 0;
+        for (_, lists) in self.lists.iter_mut().filter(|(target, _)| target.view == view) {
+            if beside {
+                std::mem::swap(&mut lists.shown, &mut lists.next);
+                self.splats.take_back(lists.next.splats_mut());
+            }
+            limit(&mut lists.shown.report);
+            self.requests.extend_from_slice(&lists.shown.requests);
+            used += lists.shown.splats_mut().pieces.len();
+        }
+        if self.cpu_budget == u64::MAX {
+            self.splats.give_away(used, beside);
+        }
+        self.splats.keep_spare(used, most_splats, self.room_bytes());
+        self.leave_the_rest_to_pages();
+        Some(report)
+    }
+
+    /// One try.
+    fn cut_at(
+        &mut self,
+        view: ViewId,
+        camera: &Camera,
+        threshold_px: f32,
+        most_splats: u64,
+        interrupt: &Interrupt,
+        beside: bool,
+    ) -> Result<CutReport, Outcome> {
+        let mut report = CutReport { threshold_px, ..CutReport::default() };
+        let coarsest = threshold_px == f32::INFINITY;
+        let mut splats_left = if coarsest { u64::MAX } else { most_splats };
+        // The memory of all of them is there for each of them.
+        for (_, lists) in self.lists.iter_mut().filter(|(target, _)| target.view == view) {
+            let replaced = if beside { &mut lists.next } else { &mut lists.shown };
+            self.splats.take_back(replaced.splats_mut());
+        }
+        for (instance, Instance { file, placement }) in &self.instances {
+            let target = Target { instance: *instance, view };
+            let room_bytes = if coarsest { u64::MAX } else { self.room_bytes() };
+            let Some(Lists { shown, next }) = self.lists.get_mut(&target) else {
+                continue;
+            };
+            let input = SelectInput {
+                file: *file,
+                view: ModelView::new(camera, placement),
+                threshold_px,
+                most_splats: splats_left,
+                room_bytes,
+                interrupt,
+                residency: &self.residency,
+            };
+            let selection = if beside { next } else { shown };
+            match self.splats.select(target, &input, selection) {
+                Outcome::Complete => {}
+                other => return Err(other),
+            }
+            splats_left -= selection.report.drawn;
+            report = report.merge(selection.report);
+        }
+        Ok(report)
+    }
+
+    /// The threshold at which a camera sees no more than `most_splats`. `None` where the search was broken off.
+    fn threshold_within(
+        &mut self,
+        camera: &Camera,
+        asked_px: f32,
+        most_splats: u64,
+        interrupt: &Interrupt,
+    ) -> Option<f32> {
+        self.search.begin(asked_px, most_splats);
+        for Instance { file, placement } in self.instances.values() {
+            let input = SelectInput {
+                file: *file,
+                view: ModelView::new(camera, placement),
+                threshold_px: asked_px,
+                most_splats,
+                room_bytes: 0,
+                interrupt,
+                residency: &self.residency,
+            };
+            if !self.splats.count_into(&input, &mut self.search) {
+                return None;
+            }
+        }
+        Some(self.search.threshold_px())
+    }
+
+    /// Bytes of lists, and of what makes them.
+    fn list_bytes(&self) -> u64 {
+        let lists = self.lists.values().map(|lists| lists.shown.bytes() + lists.next.bytes()).sum::<u64>();
+        lists + self.splats.bytes()
+    }
+
+    pub(super) fn bytes_besides_pages(&self) -> u64 {
+        let requests = (self.requests.capacity() * size_of::<PageRequest>()) as u64;
+        self.list_bytes() + self.search.bytes() + requests + self.residency.directory_bytes()
+    }
+
+    /// What lists may take together.
+    fn most_list_bytes(&self) -> u64 {
+        self.cpu_budget / 2
+    }
+
+    /// Splats of a view that the memory has room for, with a list beside it that is shown meanwhile, and pieces not quite full.
+    fn most_splats_in_memory(&self) -> u64 {
+        if self.cpu_budget == u64::MAX {
+            return u64::MAX;
+        }
+        // Keys come by instance: those of the first one are all views.
+        let first = self.lists.first_key_value().map(|(target, _)| target.instance);
+        let views = self.lists.keys().take_while(|target| Some(target.instance) == first).count() as u64;
+        self.most_list_bytes() / 16 * 7 / SplatList::SPLAT_BYTES / views.max(1)
+    }
+
+    /// Bytes that lists may grow by, as pages are.
+    fn room_bytes(&self) -> u64 {
+        let left = self.cpu_budget.saturating_sub(self.cpu_bytes());
+        left.min(self.most_list_bytes().saturating_sub(self.list_bytes()))
+    }
+
+    /// Takes memory from pages, for lists; false where lists have all that they may have.
+    fn make_room_for_lists(&mut self) -> bool {
+        let bytes = self.list_bytes();
+        let wanted = self.most_list_bytes().saturating_sub(bytes).min(bytes.max(LEAST_GROWTH_BYTES));
+        let room_before = self.room_bytes();
+        if wanted <= room_before {
+            return false;
+        }
+        self.residency.set_budget(self.cpu_budget.saturating_sub(self.bytes_besides_pages() + wanted));
+        self.room_bytes() > room_before
+    }
+
+    pub(super) fn leave_the_rest_to_pages(&mut self) {
+        if self.cpu_budget < u64::MAX {
+            self.residency.set_budget(self.cpu_budget.saturating_sub(self.bytes_besides_pages()));
+        }
+    }
+}
