@@ -23,13 +23,53 @@ pub struct VertexBatch {
     pub colors: Vec<[u8; 3]>,
 }
 
+/// What the corners of triangles carry, in the order of [`Batch::triangles`]. Each array is as long as that one, or empty
+/// where no triangle of the batch has any.
+#[derive(Clone, Debug, Default)]
+pub struct CornerBatch {
+    /// Numbers of texture coordinates, counted through the stream as vertices are, or [`CornerBatch::NONE`].
+    pub tex_coords: Vec<[u32; 3]>,
+    /// For each triangle, its place in [`ModelStream::materials`], or [`CornerBatch::NONE`].
+    pub materials: Vec<u32>,
+}
+
+impl CornerBatch {
+    /// Stands for no texture coordinate, or no material.
+    pub const NONE: u32 = u32::MAX;
+}
+
 /// Vertices and triangles that follow each other in the file; either may be empty.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
     /// The next vertices.
     pub vertices: VertexBatch,
+    /// The next texture coordinates: u to the right, v upwards, from the picture's lower left corner; finite. A format that
+    /// shares them between corners, as OBJ does, numbers them apart from its vertices, so they stream apart.
+    pub tex_coords: Vec<[f32; 2]>,
     /// Corners by vertex number, in the file's winding.
     pub triangles: Vec<[u32; 3]>,
+    /// What the corners of `triangles` carry.
+    pub corners: CornerBatch,
+}
+
+/// How a surface looks, as far as this crate reads it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// As in the file; perhaps empty.
+    pub name: String,
+    /// 8-bit sRGB: of the surface where there is no texture, a factor to the texture where there is one.
+    pub color: [u8; 3],
+    /// A picture of colours.
+    pub texture: Option<Texture>,
+}
+
+/// Where the picture of a texture is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Texture {
+    /// A file beside the model, by the name that the model has for it.
+    File(String),
+    /// A picture inside the model, PNG or JPEG, by its number in the model's list of pictures.
+    Embedded(u32),
 }
 
 impl Batch {
@@ -41,12 +81,37 @@ impl Batch {
         self.vertices.positions.clear();
         self.vertices.normals.clear();
         self.vertices.colors.clear();
+        self.tex_coords.clear();
         self.triangles.clear();
+        self.corners.tex_coords.clear();
+        self.corners.materials.clear();
     }
 
     /// True when it holds as much as a batch should.
     pub fn is_full(&self) -> bool {
-        self.vertices.positions.len() >= Self::TARGET || self.triangles.len() >= Self::TARGET
+        let most = self.vertices.positions.len().max(self.triangles.len()).max(self.tex_coords.len());
+        most >= Self::TARGET
+    }
+
+    /// True without a vertex, texture coordinate or triangle.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.vertices.positions.is_empty() && self.tex_coords.is_empty() && self.triangles.is_empty()
+    }
+
+    /// Appends a triangle with what its corners carry, if anything.
+    #[inline]
+    pub(crate) fn push_triangle(&mut self, triangle: [u32; 3], tex_coords: [u32; 3], material: u32) {
+        let before = self.triangles.len();
+        self.triangles.push(triangle);
+        let Self { corners, .. } = self;
+        if !corners.tex_coords.is_empty() || tex_coords != [CornerBatch::NONE; 3] {
+            corners.tex_coords.resize(before, [CornerBatch::NONE; 3]);
+            corners.tex_coords.push(tex_coords);
+        }
+        if !corners.materials.is_empty() || material != CornerBatch::NONE {
+            corners.materials.resize(before, CornerBatch::NONE);
+            corners.materials.push(material);
+        }
     }
 }
 
@@ -61,9 +126,26 @@ pub fn read_all(stream: &mut dyn ModelStream, progress: &mut dyn FnMut(u64, u64)
         all.vertices.positions.append(&mut batch.vertices.positions);
         all.vertices.normals.append(&mut batch.vertices.normals);
         all.vertices.colors.append(&mut batch.vertices.colors);
+        all.tex_coords.append(&mut batch.tex_coords);
+        append_corners(&mut all.corners.tex_coords, &mut batch.corners.tex_coords, [CornerBatch::NONE; 3], {
+            [all.triangles.len(), batch.triangles.len()]
+        });
+        append_corners(&mut all.corners.materials, &mut batch.corners.materials, CornerBatch::NONE, {
+            [all.triangles.len(), batch.triangles.len()]
+        });
         all.triangles.append(&mut batch.triangles);
         let (done, total) = stream.bytes_consumed();
         progress(done, total);
     }
     Ok(all)
+}
+
+/// Appends what `after` triangles carry to what `before` triangles do; either may be empty, for nothing.
+fn append_corners<T: Copy>(all: &mut Vec<T>, more: &mut Vec<T>, none: T, [before, after]: [usize; 2]) {
+    if all.is_empty() && more.is_empty() {
+        return;
+    }
+    all.resize(before, none);
+    all.append(more);
+    all.resize(before + after, none);
 }

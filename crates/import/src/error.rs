@@ -184,3 +184,14 @@ pub(crate) fn shown(bytes: &[u8]) -> String {
     let more = if bytes.len() > MOST { "…" } else { "" };
     format!("{}{more}", bytes[..bytes.len().min(MOST)].escape_ascii())
 }
+
+/// What a library says is wrong, as part of a message: one line, not too long.
+pub(crate) fn said(error: impl fmt::Display) -> String {
+    const MOST: usize = 200;
+    let words = error.to_string();
+    let mut line: String = words.chars().take(MOST).map(|it| if it.is_control() { ' ' } else { it }).collect();
+    if line.len() < words.len() {
+        line.push('…');
+    }
+    line
+}

@@ -1,9 +1,10 @@
 //! A file's bytes, unpacked, through a window that slides forward.
 //!
-//! In: a [`ByteSource`], plain or gzip (told apart by content). Out: [`Input::window`], the bytes not yet consumed that are
+//! In: a [`ByteSource`], plain, gzip or text in UTF-16 (told apart by content). Out: [`Input::window`], the bytes not yet consumed that are
 //! in memory; [`Input::fill`] lengthens it, [`Input::consume`] shortens it from the front.
 //!
-//! What always holds: memory is [`Input::CAPACITY`] bytes; the source is read front to back, once.
+//! What always holds: memory is [`Input::CAPACITY`] bytes; the source is read front to back, once, but for what
+//! [`Input::reread`] asks for.
 
 use crate::{ByteSource, ImportError, Place, error::Problem};
 use flate2::read::MultiGzDecoder;
@@ -23,6 +24,7 @@ pub(crate) struct Input {
 enum Reader {
     Plain(Box<dyn ByteSource>),
     Gzip(Box<MultiGzDecoder<Counted>>),
+    Utf16(Box<Utf16>),
 }
 
 /// Counts the compressed bytes that the unpacker takes.
@@ -54,6 +56,8 @@ impl Input {
         source.rewind().map_err(failed)?;
         let reader = match magic[..] {
             [0x1f, 0x8b] => Reader::Gzip(Box::new(MultiGzDecoder::new(Counted { source, bytes: 0 }))),
+            [0xfe, 0xff] => Reader::Utf16(Box::new(Utf16::new(source, u16::from_be_bytes))),
+            [0xff, 0xfe] => Reader::Utf16(Box::new(Utf16::new(source, u16::from_le_bytes))),
             _ => Reader::Plain(source),
         };
         let buffer = vec![0; Self::CAPACITY].into_boxed_slice();
@@ -91,6 +95,7 @@ impl Input {
             let result = match &mut self.reader {
                 Reader::Plain(source) => source.read(free),
                 Reader::Gzip(decoder) => decoder.read(free),
+                Reader::Utf16(text) => text.read(free),
             };
             match result {
                 Ok(count) => {
@@ -133,8 +138,57 @@ impl Input {
     /// there: it is unpacked to its end, so that damage does not go unseen.
     pub(crate) fn finish(&mut self) -> Result<(), ImportError> {
         match self.reader {
-            Reader::Plain(_) => Ok(()),
+            Reader::Plain(_) | Reader::Utf16(_) => Ok(()),
             Reader::Gzip(_) => self.skip(u64::MAX).map(|_| ()),
+        }
+    }
+
+    /// Length of the unpacked file, where that is known.
+    pub(crate) fn known_bytes(&self) -> Option<u64> {
+        matches!(self.reader, Reader::Plain(_)).then_some(self.source_bytes)
+    }
+
+    /// True where any part of the file can be had at any time.
+    pub(crate) fn is_plain(&self) -> bool {
+        matches!(self.reader, Reader::Plain(_))
+    }
+
+    /// Reads bytes from `offset` on, as many as there are and fit, wherever the window is; the window stays.
+    pub(crate) fn reread(&mut self, offset: u64, into: &mut [u8]) -> Result<usize, ImportError> {
+        let window_end = self.offset + (self.end - self.start) as u64;
+        let mut read = |source: &mut dyn ByteSource| -> io::Result<usize> {
+            source.seek(SeekFrom::Start(offset))?;
+            let mut count = 0;
+            while count < into.len() {
+                match source.read(&mut into[count..]) {
+                    Ok(0) => break,
+                    Ok(more) => count += more,
+                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            source.seek(SeekFrom::Start(window_end))?;
+            Ok(count)
+        };
+        let result = match &mut self.reader {
+            Reader::Plain(source) => read(source),
+            _ => Err(io::Error::other("packed files are read from front to back")),
+        };
+        result.map_err(|source| ImportError::new(Problem::Io { source }, Some(Place::byte(offset))))
+    }
+
+    /// The source itself, for readers that jump about in it.
+    ///
+    /// # Errors
+    /// The file is packed.
+    pub(crate) fn into_source(self, format: &str) -> Result<Box<dyn ByteSource>, ImportError> {
+        match self.reader {
+            Reader::Plain(source) => Ok(source),
+            _ => Err(ImportError::malformed(
+                format!("{format} as it is, since it is not read from front to back"),
+                "it packed",
+                Place::byte(0),
+            )),
         }
     }
 
@@ -143,6 +197,7 @@ impl Input {
         let consumed = match &self.reader {
             Reader::Plain(_) => self.offset,
             Reader::Gzip(decoder) => decoder.get_ref().bytes,
+            Reader::Utf16(text) => text.bytes,
         };
         (consumed, self.source_bytes)
     }
@@ -158,6 +213,77 @@ impl Input {
                 ImportError::new(Problem::Gzip { reason: source.to_string() }, Some(place))
             }
             _ => ImportError::new(Problem::Io { source }, Some(place)),
+        }
+    }
+}
+
+/// UTF-16 to UTF-8. What is no text becomes U+FFFD.
+struct Utf16 {
+    source: io::BufReader<Box<dyn ByteSource>>,
+    unit: fn([u8; 2]) -> u16,
+    /// A unit that was read too far: what came after half a pair.
+    kept: Option<u16>,
+    /// Encoded, not yet given.
+    ready: [u8; 4],
+    ready_bytes: usize,
+    bytes: u64,
+}
+
+impl Utf16 {
+    fn new(source: Box<dyn ByteSource>, unit: fn([u8; 2]) -> u16) -> Self {
+        let source = io::BufReader::new(source);
+        Self { source, unit, kept: None, ready: [0; 4], ready_bytes: 0, bytes: 0 }
+    }
+
+    /// The next unit; a lone last byte is dropped.
+    fn unit(&mut self) -> io::Result<Option<u16>> {
+        if let Some(kept) = self.kept.take() {
+            return Ok(Some(kept));
+        }
+        let mut bytes = [0; 2];
+        match self.source.read_exact(&mut bytes) {
+            Ok(()) => {
+                self.bytes += 2;
+                Ok(Some((self.unit)(bytes)))
+            }
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn character(&mut self) -> io::Result<Option<char>> {
+        let Some(first) = self.unit()? else { return Ok(None) };
+        if !(0xd800..0xdc00).contains(&first) {
+            return Ok(Some(char::from_u32(first.into()).unwrap_or(char::REPLACEMENT_CHARACTER)));
+        }
+        let second = self.unit()?;
+        match second.map(|second| char::decode_utf16([first, second]).next()) {
+            Some(Some(Ok(character))) => Ok(Some(character)),
+            _ => {
+                self.kept = second;
+                Ok(Some(char::REPLACEMENT_CHARACTER))
+            }
+        }
+    }
+}
+
+impl Read for Utf16 {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let mut count = 0;
+        loop {
+            let taken = self.ready_bytes.min(into.len() - count);
+            into[count..count + taken].copy_from_slice(&self.ready[..taken]);
+            self.ready.copy_within(taken..self.ready_bytes, 0);
+            self.ready_bytes -= taken;
+            count += taken;
+            if count == into.len() {
+                return Ok(count);
+            }
+            match self.character()? {
+                Some('\u{feff}') => {} // The mark of the byte order.
+                Some(character) => self.ready_bytes = character.encode_utf8(&mut self.ready).len(),
+                None => return Ok(count),
+            }
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Model files as bounded-memory streams.
 //!
 //! Bytes go in ([`ByteSource`]; this crate opens no file), batches of vertices and triangles come out ([`ModelStream`]), in
-//! whatever order the file has them: memory stays bounded by the batch, not by the model. Start at [`open()`].
+//! whatever order the file has them: memory stays bounded by the batch, not by the model. Start at [`open()`]. A stream of
+//! vertices without triangles is a point cloud.
 //!
 //! What always holds, whatever the bytes: positions are finite; every triangle index is below the stream's number of
 //! vertices; polygons and strips arrive as triangles; an error names where in the file it is, what was expected and what was
@@ -9,15 +10,30 @@
 #![forbid(unsafe_code)]
 
 mod batch;
+pub mod e57;
 mod error;
+pub mod gltf;
 mod input;
+pub mod las;
+mod number;
+pub mod obj;
+pub mod off;
 mod open;
+pub mod pcd;
 pub mod ply;
+mod polygon;
+mod positions;
+mod side;
+pub mod stl;
+mod text;
 mod watch;
+mod weld;
+pub mod xyz;
 
-pub use batch::{Attributes, Batch, VertexBatch, read_all};
+pub use batch::{Attributes, Batch, CornerBatch, Material, Texture, VertexBatch, read_all};
 pub use error::{ImportError, Item, Place, Position, Problem};
-pub use open::open;
+pub use open::{open, open_with};
+pub use side::{NoSideFiles, SideFiles};
 pub use watch::{AskStamp, Stamp, open_watched, utc};
 
 use gigalod_geom::camera::UpAxis;
@@ -35,6 +51,11 @@ pub trait ModelStream: Send {
     /// The file format's convention for the sky.
     fn up_axis(&self) -> UpAxis {
         UpAxis::Y
+    }
+
+    /// Materials that triangles of the batches so far have named, by number; there may be more after the next batch.
+    fn materials(&self) -> &[Material] {
+        &[]
     }
 
     /// Number of vertices, where the file says so before they come. Checked against what comes.

@@ -3,7 +3,7 @@
 //! In: a stream, and a way to ask for its source's [`Stamp`]. Out: the same stream, whose end, or first error, is an error
 //! of its own if the stamp is no longer what it was when the source was opened: a file that got shorter is not blamed for it.
 
-use crate::{Attributes, Batch, ByteSource, ImportError, ModelStream, error::Problem, open};
+use crate::{Attributes, Batch, ByteSource, ImportError, Material, ModelStream, SideFiles, error::Problem, open_with};
 use gigalod_geom::camera::UpAxis;
 use std::time::{Duration, SystemTime};
 use std::{fmt, io};
@@ -20,14 +20,18 @@ pub struct Stamp {
 /// Asks for the stamp as it is now.
 pub type AskStamp = Box<dyn FnMut() -> io::Result<Stamp> + Send>;
 
-/// As [`open()`], for a source that others might write to.
+/// As [`open_with`], for a source that others might write to.
 ///
 /// # Errors
 /// As there; and from the stream, that the source has changed.
-pub fn open_watched(source: Box<dyn ByteSource>, mut ask: AskStamp) -> Result<Box<dyn ModelStream>, ImportError> {
+pub fn open_watched(
+    source: Box<dyn ByteSource>,
+    side: Box<dyn SideFiles>,
+    mut ask: AskStamp,
+) -> Result<Box<dyn ModelStream>, ImportError> {
     let opened = ask().map_err(|source| ImportError::new(Problem::Io { source }, None))?;
     let mut watch = Watch { opened, ask };
-    let stream = open(source).map_err(|error| watch.explain(error))?;
+    let stream = open_with(source, side).map_err(|error| watch.explain(error))?;
     Ok(Box::new(Watched { stream, watch }))
 }
 
@@ -63,6 +67,10 @@ impl ModelStream for Watched {
 
     fn up_axis(&self) -> UpAxis {
         self.stream.up_axis()
+    }
+
+    fn materials(&self) -> &[Material] {
+        self.stream.materials()
     }
 
     fn declared_vertices(&self) -> Option<u64> {
@@ -102,7 +110,7 @@ pub fn utc(time: SystemTime) -> impl fmt::Display {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read_all;
+    use crate::{NoSideFiles, read_all};
     use std::io::{Read, Seek, SeekFrom};
     use std::sync::{Arc, Mutex};
 
@@ -120,7 +128,7 @@ mod tests {
         fn open(&self) -> Result<Box<dyn ModelStream>, ImportError> {
             let asked = self.clone();
             let ask = Box::new(move || Ok(asked.0.lock().unwrap().1));
-            open_watched(Box::new(Source { file: self.clone(), at: 0 }), ask)
+            open_watched(Box::new(Source { file: self.clone(), at: 0 }), Box::new(NoSideFiles), ask)
         }
     }
 
@@ -202,7 +210,8 @@ mod tests {
             asked += 1;
             Ok(stamps[asked - 1])
         });
-        let error = open_watched(Box::new(Source { file, at: 0 }), ask).err().unwrap().to_string();
+        let error =
+            open_watched(Box::new(Source { file, at: 0 }), Box::new(NoSideFiles), ask).err().unwrap().to_string();
         assert!(error.starts_with("changed while it was read (expected 30 bytes"), "{error}");
     }
 }

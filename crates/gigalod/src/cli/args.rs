@@ -37,7 +37,8 @@ pub(crate) enum Command {
 
 /// Convert a model into a .glod file
 ///
-/// Reads PLY (ASCII and binary, also gzipped). The output appears under its name only when it is complete.
+/// Reads meshes (PLY, OBJ, STL, OFF, glTF and GLB) and clouds of points (PLY, LAS and LAZ, E57, PCD, PTS, XYZ), told apart by
+/// their content; text formats, PLY, STL and LAS also gzipped. The output appears under its name only when it is complete.
 #[derive(Args, Debug)]
 #[command(after_help = "Example:\n  gigalod build statue.ply.gz -o statue.glod")]
 pub(crate) struct BuildArgs {
@@ -90,7 +91,7 @@ pub(crate) enum UpAxisArg {
 
 /// Draw a picture of a model
 ///
-/// A raw model (PLY) is first built into the cache of the user ($XDG_CACHE_HOME/gigalod or ~/.cache/gigalod).
+/// A raw model is first built into the cache of the user ($XDG_CACHE_HOME/gigalod or ~/.cache/gigalod).
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  gigalod render statue.glod -o statue.png\n  \
     gigalod render statue.glod -o face.png --orbit 30,10,4 --error 0.5\n  \

@@ -4,10 +4,10 @@ use super::error::CliError;
 use gigalod_build::InputIdentity;
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, FileStore};
-use gigalod_import::{ByteSource, ModelStream, Stamp};
+use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
 use std::fs::File;
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Component, Path};
 use std::sync::Arc;
 
 /// Opens a raw model.
@@ -25,9 +25,28 @@ pub(crate) fn open_input(path: &Path) -> Result<(Box<dyn ModelStream>, InputIden
         let metadata = watched.metadata()?;
         Ok(Stamp { bytes: metadata.len(), modified: metadata.modified()? })
     };
-    let stream = gigalod_import::open_watched(Box::new(file) as Box<dyn ByteSource>, Box::new(ask))
+    let stream = gigalod_import::open_watched(Box::new(file), side_files(path), Box::new(ask))
         .map_err(|error| CliError::import(path, &error))?;
     Ok((stream, identity))
+}
+
+/// Opens files that a model names: only those in its folder and below, since a model may come from anywhere.
+fn side_files(path: &Path) -> Box<dyn SideFiles> {
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    Box::new(move |name: &str| -> io::Result<Box<dyn ByteSource>> {
+        // Programs for Windows write its separators.
+        let name = name.replace('\\', "/");
+        let is_below =
+            Path::new(&name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        if !is_below {
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "not in the folder of the model"));
+        }
+        let path = folder.join(name);
+        if !std::fs::metadata(&path)?.is_file() {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
+        }
+        Ok(Box::new(File::open(path)?))
+    })
 }
 
 /// Opens a `.glod` file.

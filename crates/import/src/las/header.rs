@@ -1,0 +1,148 @@
+//! The header of LAS, and the record that says how LAZ is packed.
+//!
+//! What always holds: records are as long as their point format needs at least; the points lie behind the header; a LAZ
+//! file's items make up its records.
+
+use crate::{ImportError, Place, input::Input};
+use laz::LazVlr;
+
+/// Least length of a header, that of LAS 1.0.
+const LEAST_HEADER_BYTES: usize = 227;
+/// Length of the header of LAS 1.4.
+const HEADER_BYTES_1_4: usize = 375;
+/// Most variable-length records that are looked through.
+const MOST_RECORDS: u32 = 1 << 16;
+/// A record of LAZ has a few items of 6 bytes.
+const MOST_LAZ_BYTES: usize = 1 << 12;
+
+/// Bytes of a record without extra bytes, and where its colour is, by point format.
+const POINT_FORMATS: [(usize, Option<usize>); 11] = [
+    (20, None),
+    (28, None),
+    (26, Some(20)),
+    (34, Some(28)),
+    (57, None),
+    (63, Some(28)),
+    (30, None),
+    (36, Some(30)),
+    (38, Some(30)),
+    (59, None),
+    (67, Some(30)),
+];
+
+pub(super) struct Header {
+    /// Below 2³²; declared, perhaps a lie.
+    pub(super) point_count: u64,
+    pub(super) points_offset: u64,
+    pub(super) record_bytes: usize,
+    /// Where in a record the colour is.
+    pub(super) color_offset: Option<usize>,
+    /// Of x, y and z.
+    pub(super) scale: [f64; 3],
+    pub(super) offset: [f64; 3],
+    /// How the points are packed, if they are.
+    pub(super) laz: Option<LazVlr>,
+}
+
+impl Header {
+    /// The file ends at `offset`, within point `number`.
+    pub(super) fn truncated(&self, number: u64, offset: u64) -> ImportError {
+        ImportError::truncated(format!("point {number} of {} is complete", self.point_count), Place::byte(offset))
+    }
+}
+
+/// Reads the header and the variable-length records, as far as they matter.
+pub(super) fn read(input: &mut Input) -> Result<Header, ImportError> {
+    let ends_early = |input: &Input| {
+        ImportError::truncated("the header is complete", Place::byte(input.offset() + input.window().len() as u64))
+    };
+    if !input.has(LEAST_HEADER_BYTES)? {
+        return Err(ends_early(input));
+    }
+    let header_bytes = usize::from(u16_at(input.window(), 94));
+    let is_1_4 = input.window()[24..26] >= [1, 4][..] && header_bytes >= HEADER_BYTES_1_4;
+    if header_bytes < LEAST_HEADER_BYTES {
+        let expected = format!("a header of at least {LEAST_HEADER_BYTES} bytes");
+        return Err(ImportError::malformed(expected, header_bytes.to_string(), Place::byte(94)));
+    }
+    if !input.has(header_bytes)? {
+        return Err(ends_early(input));
+    }
+    let bytes = input.window();
+    let [major, minor] = [bytes[24], bytes[25]];
+    if major != 1 || minor > 4 {
+        return Err(ImportError::malformed("LAS 1.0 to 1.4", format!("version {major}.{minor}"), Place::byte(24)));
+    }
+    let (points_offset, vlr_count) = (u64::from(u32_at(bytes, 96)), u32_at(bytes, 100));
+    // The two upper bits say that the points are packed.
+    let (point_format, is_packed) = (usize::from(bytes[104] & 0x3f), bytes[104] & 0x80 != 0);
+    let record_bytes = usize::from(u16_at(bytes, 105));
+    let Some(&(least, color_offset)) = POINT_FORMATS.get(point_format) else {
+        return Err(ImportError::malformed("a point format from 0 to 10", point_format.to_string(), Place::byte(104)));
+    };
+    if record_bytes < least {
+        let expected = format!("at least {least} bytes for a point of format {point_format}");
+        return Err(ImportError::malformed(expected, record_bytes.to_string(), Place::byte(105)));
+    }
+    if points_offset < header_bytes as u64 {
+        let expected = format!("points after the {header_bytes} bytes of the header");
+        return Err(ImportError::malformed(expected, points_offset.to_string(), Place::byte(96)));
+    }
+    let legacy_count = u64::from(u32_at(bytes, 107));
+    let point_count = match is_1_4.then(|| u64::from_le_bytes(bytes_at(bytes, 247))) {
+        Some(count) if count > 0 => count,
+        _ => legacy_count,
+    };
+    if point_count >= u64::from(u32::MAX) {
+        return Err(ImportError::malformed("fewer than 4294967295 points", point_count.to_string(), Place::byte(247)));
+    }
+    let triple = |at: usize| std::array::from_fn(|axis| f64::from_le_bytes(bytes_at(bytes, at + 8 * axis)));
+    let (scale, offset): ([f64; 3], [f64; 3]) = (triple(131), triple(155));
+    input.consume(header_bytes);
+    let laz = if is_packed { Some(read_laz(input, vlr_count, points_offset, record_bytes)?) } else { None };
+    Ok(Header { point_count, points_offset, record_bytes, color_offset, scale, offset, laz })
+}
+
+/// Finds the record of LAZ among the variable-length records.
+fn read_laz(input: &mut Input, vlr_count: u32, points_offset: u64, record_bytes: usize) -> Result<LazVlr, ImportError> {
+    /// Bytes before the contents of a variable-length record.
+    const RECORD_HEADER_BYTES: usize = 54;
+    let missing = |place| ImportError::malformed("a record `laszip encoded` before the packed points", "none", place);
+    for _ in 0..vlr_count.min(MOST_RECORDS) {
+        let place = Place::byte(input.offset());
+        if input.offset() + RECORD_HEADER_BYTES as u64 > points_offset || !input.has(RECORD_HEADER_BYTES)? {
+            return Err(missing(place));
+        }
+        let head = input.window();
+        let bytes = usize::from(u16_at(head, 20));
+        let is_laz = head[2..].starts_with(LazVlr::USER_ID.as_bytes()) && u16_at(head, 18) == LazVlr::RECORD_ID;
+        input.consume(RECORD_HEADER_BYTES);
+        if !is_laz {
+            input.skip(bytes as u64)?;
+            continue;
+        }
+        if bytes > MOST_LAZ_BYTES || !input.has(bytes)? {
+            return Err(missing(place));
+        }
+        let vlr = LazVlr::from_buffer(&input.window()[..bytes])
+            .map_err(|error| ImportError::malformed("a record that describes LAZ", error.to_string(), place.clone()))?;
+        super::laz::check(&vlr, record_bytes).map_err(|found| {
+            let expected = format!("items of LAZ that make up points of {record_bytes} bytes");
+            ImportError::malformed(expected, found, place)
+        })?;
+        return Ok(vlr);
+    }
+    Err(missing(Place::byte(input.offset())))
+}
+
+fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    *bytes[at..].first_chunk().expect("the header is that long")
+}
+
+fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(bytes_at(bytes, at))
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes_at(bytes, at))
+}

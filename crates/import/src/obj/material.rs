@@ -1,0 +1,126 @@
+//! Materials: numbers for the names that `usemtl` gives, and what libraries say about them.
+
+use crate::{
+    Material, SideFiles, Texture,
+    input::Input,
+    text::{self, Lines, name, numbers},
+};
+use std::collections::HashMap;
+
+/// Most materials of a model, so that hostile names take bounded memory.
+const MOST: usize = 1 << 16;
+/// Most libraries that are looked for.
+const MOST_LIBRARIES: u32 = 256;
+/// Longest name in bytes.
+const MAX_NAME_BYTES: usize = 1024;
+
+/// The materials of a file.
+#[derive(Default)]
+pub(super) struct Materials {
+    /// Those used so far.
+    pub(super) used: Vec<Material>,
+    numbers: HashMap<String, u32>,
+    /// What libraries say, by name.
+    library: HashMap<String, Material>,
+    /// Libraries that were looked for.
+    libraries: u32,
+}
+
+impl Materials {
+    /// The number of the material that `usemtl` names; none where there are too many.
+    pub(super) fn number(&mut self, rest: &[u8]) -> Option<u32> {
+        let name = name(&rest[..rest.len().min(MAX_NAME_BYTES)]);
+        if let Some(&number) = self.numbers.get(&name) {
+            return Some(number);
+        }
+        let number = u32::try_from(self.used.len()).ok().filter(|_| self.used.len() < MOST)?;
+        let material = self.library.get(&name).cloned().unwrap_or_else(|| plain(name.clone()));
+        self.used.push(material);
+        self.numbers.insert(name, number);
+        Some(number)
+    }
+
+    /// Reads a library; one that cannot be had, or is none, as far as it goes.
+    pub(super) fn read_library(&mut self, rest: &[u8], side: &mut dyn SideFiles) {
+        // The rest of the line is one name, perhaps with blanks, or several.
+        let whole = name(rest);
+        if !self.read_file(&whole, side) {
+            for name in whole.split_ascii_whitespace() {
+                self.read_file(name, side);
+            }
+        }
+    }
+
+    /// Reads a library if it can be had.
+    fn read_file(&mut self, name: &str, side: &mut dyn SideFiles) -> bool {
+        if self.libraries == MOST_LIBRARIES {
+            return false;
+        }
+        self.libraries += 1;
+        // What is wrong with it is no error of the model.
+        side.open(name).map(|source| self.read(source)).is_ok()
+    }
+
+    fn read(&mut self, source: Box<dyn crate::ByteSource>) -> Result<(), crate::ImportError> {
+        let mut input = Input::new(source)?;
+        input.has(1)?;
+        let mut lines = Lines::continued(&input);
+        let mut material: Option<Material> = None;
+        while let Some(line) = lines.next(&mut input)? {
+            let Some((word, rest)) = text::word(line) else { continue };
+            match (word, &mut material) {
+                (b"newmtl", _) => {
+                    let next = plain(name(&rest[..rest.len().min(MAX_NAME_BYTES)]));
+                    self.insert(material.replace(next));
+                }
+                (b"Kd", Some(material)) => {
+                    if let Ok((color, _)) = numbers::<3>(rest) {
+                        material.color = color.map(|value| (value * 255.0 + 0.5) as u8);
+                    }
+                }
+                (b"map_Kd", Some(material)) => material.texture = texture_name(rest).map(Texture::File),
+                _ => {}
+            }
+        }
+        self.insert(material);
+        Ok(())
+    }
+
+    fn insert(&mut self, material: Option<Material>) {
+        if let Some(material) = material
+            && self.library.len() < MOST
+        {
+            self.library.entry(material.name.clone()).or_insert(material);
+        }
+    }
+}
+
+fn plain(name: String) -> Material {
+    Material { name, color: [255; 3], texture: None }
+}
+
+/// The file's name after the options of a `map_Kd`, each of which has a known number of arguments.
+fn texture_name(mut rest: &[u8]) -> Option<String> {
+    while let Some((word, after)) = text::word(rest)
+        && word.starts_with(b"-")
+    {
+        let most = match word {
+            b"-o" | b"-s" | b"-t" => 3,
+            b"-mm" => 2,
+            b"-blendu" | b"-blendv" | b"-boost" | b"-bm" | b"-cc" | b"-clamp" | b"-imfchan" | b"-texres" | b"-type" => {
+                1
+            }
+            _ => break, // A name that begins with a minus.
+        };
+        rest = after;
+        for argument in 0..most {
+            match text::word(rest) {
+                // Of three numbers, the last two may be missing.
+                Some((word, after)) if argument == 0 || crate::number::parse(word).is_some() => rest = after,
+                _ => break,
+            }
+        }
+    }
+    let name = name(&rest[..rest.len().min(MAX_NAME_BYTES)]);
+    (!name.is_empty()).then_some(name)
+}
