@@ -3,9 +3,12 @@
 use crate::make::{e57, las};
 use crate::sources::{Model, error, read, read_in_drops};
 
+/// A text, and the positions, colours and normals of its points.
+type Columns = (&'static str, &'static [[f64; 3]], &'static [[u8; 3]], &'static [[f32; 3]]);
+
 #[test]
 fn columns_of_text_are_told_by_their_values() {
-    let cases: &[(&str, &[[f64; 3]], &[[u8; 3]], &[[f32; 3]])] = &[
+    let cases: &[Columns] = &[
         ("1 2 3\n4 5 6\n", &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], &[], &[]),
         ("1;2;3\r\n4;5;6\r\n", &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], &[], &[]),
         (
