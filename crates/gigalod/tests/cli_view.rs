@@ -190,7 +190,7 @@ fn a_rested_picture_is_that_of_render_on_the_screen_and_in_a_file() {
     let place = tempfile::tempdir_in(folder()).unwrap();
     let viewing = screen.view(place.path(), [&statue().glod]);
     let first = viewing.takes_picture("statue-1.png");
-    viewing.presses("Tab");
+    viewing.presses("F2");
     viewing.drags(MIDDLE, [150, 60], "1");
     viewing.hand(&["mousemove", "320", "250", "click", "4", "sleep", "0.2", "click", "4"]);
     viewing.drags(MIDDLE, [30, -20], "3");

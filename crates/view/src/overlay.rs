@@ -19,7 +19,7 @@ const HELP: [(&str, &str); 17] = [
     ("P", "save a picture"),
     ("R", "record a camera path, and stop"),
     ("Space", "play it, and stop"),
-    ("Tab", "hide the panel, and show it"),
+    ("F2", "hide the panel, and show it"),
     ("F1", "this help"),
     ("Esc", "leave help and measuring"),
 ];

@@ -27,7 +27,7 @@ impl Viewer {
                 ui.separator();
                 ui.horizontal(|ui| {
                     ui.toggle_value(&mut self.shows_help, "Keys (F1)");
-                    ui.weak("Tab hides this panel");
+                    ui.weak("F2 hides this panel");
                 });
             });
         });

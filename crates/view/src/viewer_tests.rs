@@ -106,6 +106,7 @@ impl Person {
         let viewer = Viewer::new(&options, files.clone(), mailbox, picker, || {});
         let mut harness = Harness::builder()
             .with_size(vec2(SIZE.width as f32, SIZE.height as f32))
+            .with_step_dt(1.0 / 60.0)
             .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui, SIZE), viewer);
         harness.run_steps(2);
         let mut person = Self { harness, files, _folder: folder };
@@ -142,14 +143,13 @@ impl Person {
     }
 
     fn drags(&mut self, from: Pos2, to: Pos2, button: PointerButton, modifiers: Modifiers) {
-        self.harness.input_mut().modifiers = modifiers;
+        self.event(Event::ModifiersChanged(modifiers));
         self.button(from, button, true, modifiers);
         for part in [0.25, 0.5, 0.75, 1.0] {
             self.event(Event::PointerMoved(from + (to - from) * part));
         }
         self.button(to, button, false, modifiers);
-        self.harness.input_mut().modifiers = Modifiers::NONE;
-        self.harness.run_steps(1);
+        self.event(Event::ModifiersChanged(Modifiers::NONE));
     }
 
     fn clicks(&mut self, at: Pos2) {
@@ -163,6 +163,7 @@ impl Person {
             unit: MouseWheelUnit::Point,
             delta: vec2(0.0, points),
             phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Wheel,
             modifiers: Modifiers::NONE,
         });
         self.harness.run_steps(20);
@@ -337,6 +338,6 @@ fn what_is_chosen_in_the_panel_is_wished_for() {
     assert_eq!(person.viewer().names.picture, "statue-2.png");
     person.presses(egui::Key::F1);
     assert!(person.harness.query_by_label("Mouse and keys").is_some());
-    person.presses(egui::Key::Tab);
+    person.presses(egui::Key::F2);
     assert!(person.harness.query_by_label("levels").is_none(), "the panel is hidden");
 }

@@ -27,7 +27,7 @@ const LIGHT_PER_POINT: f64 = 0.01;
 impl Viewer {
     /// Keys that work wherever the mouse is, unless something is being typed.
     pub(crate) fn keys(&mut self, ui: &Ui, now: f64) {
-        if ui.ctx().egui_wants_keyboard_input() {
+        if ui.ctx().text_edit_focused() {
             return;
         }
         let pressed = |key| ui.input(|input| input.key_pressed(key) && !input.modifiers.command);
@@ -46,7 +46,7 @@ impl Viewer {
         for (key, toggled) in [
             (Key::F1, &mut self.shows_help),
             (Key::F, &mut self.flies),
-            (Key::Tab, &mut self.shows_panel),
+            (Key::F2, &mut self.shows_panel),
             (Key::M, &mut self.measuring.is_on),
         ] {
             *toggled ^= pressed(key);

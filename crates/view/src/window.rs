@@ -194,9 +194,12 @@ impl Running {
     /// One frame of the window.
     fn frame(&mut self) -> Result<Next, ViewError> {
         let begun = thread_cpu_ms();
+        if std::mem::take(&mut self.viewer.wants_recovery) {
+            self.recover()?;
+        }
         let raw = self.input.take_egui_input(&self.window);
         let (viewer, size) = (&mut self.viewer, self.size);
-        let output = self.context.run_ui(raw, |ui| viewer.ui(ui, size));
+        let mut output = self.context.run_ui(raw, |ui| viewer.ui(ui, size));
         self.input.handle_platform_output(&self.window, output.platform_output);
         let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
         let ui = UiPaint {
@@ -204,11 +207,9 @@ impl Running {
             textures: &output.textures_delta,
             pixels_per_point: output.pixels_per_point,
         };
-        if std::mem::take(&mut self.viewer.wants_recovery) {
-            self.recover()?;
-        }
         let shown = self.mailbox.shown();
         let painted = self.painter.paint(shown.as_ref(), &ui);
+        output.textures_delta.clear();
         let painted = match painted {
             Err(RenderError::DeviceLost(_)) => {
                 self.recover()?;
