@@ -115,12 +115,12 @@ impl Viewing<'_> {
     fn drags(&self, from: [i32; 2], by: [i32; 2], button: &str) {
         let text = |at: [i32; 2]| at.map(|x| x.to_string());
         let [x, y] = text(from);
-        self.hand(&["mousemove", &x, &y, "mousedown", button]);
+        self.hand(&["mousemove", &x, &y, "sleep", "0.3", "mousedown", button]);
         for step in 1..=4 {
             let [x, y] = text([from[0] + by[0] * step / 4, from[1] + by[1] * step / 4]);
-            self.hand(&["mousemove", &x, &y]);
+            self.hand(&["sleep", "0.1", "mousemove", &x, &y]);
         }
-        self.hand(&["mouseup", button]);
+        self.hand(&["sleep", "0.3", "mouseup", button]);
     }
 
     fn clicks(&self, [x, y]: [i32; 2]) {

@@ -83,8 +83,8 @@ mod tests {
 
     #[test]
     fn numbers_have_the_digits_that_are_true() {
-        assert_eq!(digits(123.456_789, 0.01), "123.457");
-        assert_eq!(digits(0.001_234_567, 1e-6), "0.0012346");
+        assert_eq!(digits(123.456_789, 0.01), "123.46");
+        assert_eq!(digits(0.001_234_567, 1e-6), "0.001235");
         assert_eq!(digits(12.345_678_912_3, 0.0), "12.3456789");
         assert_eq!(digits(98_765.0, 500.0), "98765");
     }

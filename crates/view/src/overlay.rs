@@ -4,7 +4,7 @@ use crate::viewer::Viewer;
 use egui::{Align2, Color32, Frame, ProgressBar, RichText, ScrollArea, Ui, Window, vec2};
 
 /// What mouse and keys do.
-const HELP: [(&str, &str); 17] = [
+const HELP: [(&str, &str); 18] = [
     ("drag", "turn around the pivot"),
     ("right or middle drag, Shift+drag", "move across"),
     ("wheel", "come nearer to what is under the cursor"),
@@ -22,6 +22,7 @@ const HELP: [(&str, &str); 17] = [
     ("F2", "hide the panel, and show it"),
     ("F1", "this help"),
     ("Esc", "leave help and measuring"),
+    ("Ctrl+Q", "close the window"),
 ];
 
 impl Viewer {

@@ -12,23 +12,19 @@ use gigalod_runtime::splats::Tint;
 use std::path::PathBuf;
 
 /// Points.
-const WIDTH: f32 = 290.0;
+const WIDTH: f32 = 320.0;
 
 impl Viewer {
     pub(crate) fn panel(&mut self, ui: &mut Ui, now: f64) {
-        Panel::right("panel").exact_size(WIDTH).resizable(false).show(ui, |ui| {
+        let frame = egui::Frame::side_top_panel(ui.style()).inner_margin(10.0);
+        Panel::right("panel").exact_size(WIDTH).resizable(false).frame(frame).show(ui, |ui| {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 self.models_section(ui, now);
                 section(ui, "Picture", |ui| self.picture_section(ui));
-                section(ui, "Figures", |ui| self.figures_section(ui));
                 section(ui, "Measure", |ui| self.measure_section(ui));
                 section(ui, "Camera path", |ui| self.path_section(ui, now));
                 section(ui, "Save", |ui| self.save_section(ui, now));
-                ui.separator();
-                ui.horizontal(|ui| {
-                    ui.toggle_value(&mut self.shows_help, "Keys (F1)");
-                    ui.weak("F2 hides this panel");
-                });
+                section(ui, "Figures", |ui| self.figures_section(ui));
             });
         });
     }
@@ -40,6 +36,8 @@ impl Viewer {
             if ui.button("Home").on_hover_text("Look at everything (Home)").clicked() {
                 self.steer(&Input::Home, now);
             }
+            ui.toggle_value(&mut self.shows_help, "Keys (F1)");
+            ui.weak("F2 hides this");
         });
         let mut removed: Option<ModelKey> = None;
         for Staged { key, model } in &self.models {
@@ -61,18 +59,22 @@ impl Viewer {
     fn picture_section(&mut self, ui: &mut Ui) {
         let settings = &mut self.settings;
         Grid::new("picture").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
-            ui.label("Error at rest").on_hover_text("Largest error on screen that is wanted");
-            ui.add(Slider::new(&mut settings.finest_px, 0.25..=32.0).logarithmic(true).suffix(" px"));
+            let label = ui.label("Error at rest").on_hover_text("Largest error on screen that is wanted");
+            let slider = Slider::new(&mut settings.finest_px, 0.25..=32.0).logarithmic(true).suffix(" px");
+            ui.add(slider).labelled_by(label.id);
             ui.end_row();
-            ui.label("Frame time").on_hover_text("How long a frame may take while the camera moves");
-            ui.add(Slider::new(&mut settings.target_ms, 8.0..=500.0).logarithmic(true).suffix(" ms"));
+            let label = ui.label("Frame time").on_hover_text("How long a frame may take while the camera moves");
+            let slider = Slider::new(&mut settings.target_ms, 8.0..=500.0).logarithmic(true).suffix(" ms");
+            ui.add(slider).labelled_by(label.id);
             ui.end_row();
-            ui.label("Kernel");
-            egui::ComboBox::from_id_salt("kernel").selected_text(kernel_name(settings.kernel)).show_ui(ui, |ui| {
+            let label = ui.label("Kernel");
+            let chosen = egui::ComboBox::from_id_salt("kernel").selected_text(kernel_name(settings.kernel));
+            let list = chosen.show_ui(ui, |ui| {
                 for kernel in Kernel::ALL {
                     ui.selectable_value(&mut settings.kernel, kernel, kernel_name(kernel));
                 }
             });
+            list.response.labelled_by(label.id);
             ui.end_row();
             ui.label("Colours");
             ui.horizontal(|ui| {
@@ -80,8 +82,8 @@ impl Viewer {
                 ui.selectable_value(&mut settings.tint, Tint::Level, "levels");
             });
             ui.end_row();
-            ui.label("Background");
-            ui.color_edit_button_srgb(&mut settings.background);
+            let label = ui.label("Background");
+            ui.color_edit_button_srgb(&mut settings.background).labelled_by(label.id);
             ui.end_row();
             ui.label("Light").on_hover_text("Drag in the picture with Ctrl held down");
             ui.horizontal(|ui| match settings.towards_light {
@@ -140,9 +142,8 @@ impl Viewer {
             row("error on screen", error);
             row("", limit.to_string());
             row("threshold", format!("{:.2} px", report.threshold_px));
-            row("nodes visited", count(report.visited));
             row("splats drawn", count(report.drawn));
-            row("culled", format!("{} + {}", count(report.culled_frustum), count(report.culled_backface)));
+            row("nodes visited", count(report.visited));
             row("page misses", count(figures.misses));
             row("pages resident", bytes(figures.resident_bytes));
             row("memory", bytes(figures.cpu_bytes));
@@ -224,10 +225,10 @@ impl Viewer {
     fn save_section(&mut self, ui: &mut Ui, now: f64) {
         Grid::new("save").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
             let mut row = |text: &str, name: &mut String, is_enabled: bool| {
-                let clicked = ui.add_enabled(is_enabled, egui::Button::new(text)).clicked();
-                ui.add(TextEdit::singleline(name).desired_width(150.0));
+                let button = ui.add_enabled(is_enabled, egui::Button::new(text));
+                ui.add(TextEdit::singleline(name).desired_width(180.0)).labelled_by(button.id);
                 ui.end_row();
-                clicked
+                button.clicked()
             };
             let picture = row("Picture (P)", &mut self.names.picture, !self.models.is_empty());
             let path = row("Path", &mut self.names.path, self.recorder.path().is_some());

@@ -210,6 +210,29 @@ fn a_file_that_cannot_be_opened_is_told_and_a_folder_is_a_choice() {
     assert!(person.harness.query_by_label("other.ply").is_none(), "the choice is made");
 }
 
+/// A file that is let go over the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Err("the viewer opens files by their names".into())
+    }
+}
+
+#[test]
+fn what_is_dropped_onto_the_window_is_shown_with_the_rest() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.harness.input_mut().dropped_files.push(Arc::new(Dropped("statue.glod".into())));
+    person.waits_until(|viewer| viewer.models.len() == 2);
+    let orders = person.viewer().mailbox.receive(Some(Duration::ZERO)).orders;
+    assert!(matches!(&orders[..], [Order::Add(first, ..), Order::Add(second, ..)] if first != second));
+}
+
 #[test]
 fn the_mouse_turns_moves_and_comes_nearer() {
     let mut person = Person::opens(&["statue.glod"]);

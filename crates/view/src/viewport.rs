@@ -4,7 +4,7 @@ use crate::measure::digits;
 use crate::navigation::Input;
 use crate::picker::Purpose;
 use crate::viewer::Viewer;
-use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Sense, Stroke, Ui};
+use egui::{Align2, Color32, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
 use gigalod_geom::Camera;
 use glam::{DQuat, DVec2, DVec3};
 
@@ -27,10 +27,12 @@ const LIGHT_PER_POINT: f64 = 0.01;
 impl Viewer {
     /// Keys that work wherever the mouse is, unless something is being typed.
     pub(crate) fn keys(&mut self, ui: &Ui, now: f64) {
+        // By the modifiers at the moment of the key: they may be up again by now.
+        self.wants_to_quit |= ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Q));
         if ui.ctx().text_edit_focused() {
             return;
         }
-        let pressed = |key| ui.input(|input| input.key_pressed(key) && !input.modifiers.command);
+        let pressed = |key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         if pressed(Key::Home) {
             self.steer(&Input::Home, now);
         }

@@ -230,8 +230,7 @@ impl Running {
                 tally.shown(self.viewer.figures.wish);
             }
         }
-        let quits = self.context.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Q));
-        if quits {
+        if self.viewer.wants_to_quit {
             return Ok(Next::End);
         }
         let delay = output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
