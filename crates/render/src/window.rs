@@ -47,21 +47,30 @@ impl Shown {
 pub struct UiPaint<'a> {
     /// Tessellated shapes.
     pub primitives: &'a [ClippedPrimitive],
-    /// Changes of textures since the last frame; they are taken in even where the window cannot be painted.
-    pub textures: &'a TexturesDelta,
     /// Physical pixels for each of egui's points.
     pub pixels_per_point: f32,
 }
 
-/// What became of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Painted {
-    /// It is shown.
-    Done,
+/// What became of asking for an image.
+#[derive(Debug)]
+pub enum Acquired {
+    /// To be painted.
+    Image(WindowImage),
     /// The window is hidden, or has no size.
     Hidden,
-    /// The surface was put right; this frame is to be painted once more.
+    /// The surface was put right: ask once more.
     Again,
+}
+
+/// An image that the window will show.
+#[derive(Debug)]
+pub struct WindowImage(wgpu::SurfaceTexture);
+
+/// The same, with what paints it.
+#[derive(Debug)]
+pub struct PaintedImage {
+    commands: Vec<wgpu::CommandBuffer>,
+    target: wgpu::SurfaceTexture,
 }
 
 /// Paints one window.
@@ -139,42 +148,42 @@ impl WindowPainter {
         }
     }
 
-    /// Shows a picture, stretched where it has another size than the window, under a user interface. Waits for the display.
+    /// The next image of the window; waits for the display. The driver's work, as [`WindowPainter::show`] is.
     ///
     /// # Errors
     /// [`RenderError::DeviceLost`]: [`WindowPainter::recover`]; others say what was wrong.
-    pub fn paint(&mut self, shown: Option<&Shown>, ui: &UiPaint<'_>) -> Result<Painted, RenderError> {
-        self.gpu.check()?;
-        self.ui.take(&self.gpu, ui.textures);
-        let painted = self.paint_window(shown, ui);
-        self.ui.free(ui.textures);
-        let painted = painted?;
-        self.gpu.check()?;
-        Ok(painted)
-    }
-
-    fn paint_window(&mut self, shown: Option<&Shown>, ui: &UiPaint<'_>) -> Result<Painted, RenderError> {
+    pub fn acquire(&mut self) -> Result<Acquired, RenderError> {
         use wgpu::CurrentSurfaceTexture as Current;
+        self.gpu.check()?;
         if self.size.width.min(self.size.height) == 0 {
-            return Ok(Painted::Hidden);
+            return Ok(Acquired::Hidden);
         }
-        let target = match self.surface.surface.get_current_texture() {
-            Current::Success(target) => target,
-            Current::Suboptimal(target) => target,
-            Current::Timeout | Current::Validation => return Ok(Painted::Again),
-            Current::Occluded => return Ok(Painted::Hidden),
+        match self.surface.surface.get_current_texture() {
+            Current::Success(target) | Current::Suboptimal(target) => Ok(Acquired::Image(WindowImage(target))),
+            Current::Timeout | Current::Validation => Ok(Acquired::Again),
+            Current::Occluded => Ok(Acquired::Hidden),
             Current::Outdated => {
                 self.surface.surface.configure(&self.gpu.device, &self.surface.config);
-                return Ok(Painted::Again);
+                Ok(Acquired::Again)
             }
             Current::Lost => {
                 self.gpu.check()?;
                 let made = self.surface.instance.create_surface(Handles(self.window.clone()));
                 self.surface.surface = made.map_err(|error| RenderError::NoAdapter(error.to_string()))?;
                 self.surface.surface.configure(&self.gpu.device, &self.surface.config);
-                return Ok(Painted::Again);
+                Ok(Acquired::Again)
             }
-        };
+        }
+    }
+
+    /// Takes in changes of textures; to be called for each frame of egui, also where there is no image to paint.
+    pub fn take_textures(&mut self, textures: &TexturesDelta) {
+        self.ui.take(&self.gpu, textures);
+    }
+
+    /// Paints a picture, stretched where it has another size than the window, under a user interface.
+    pub fn paint(&mut self, target: WindowImage, shown: Option<&Shown>, ui: &UiPaint<'_>) -> PaintedImage {
+        let WindowImage(target) = target;
         let Gpu { device, queue, .. } = &self.gpu;
         let screen = ScreenDescriptor {
             size_in_pixels: [self.surface.config.width, self.surface.config.height],
@@ -200,9 +209,22 @@ impl WindowPainter {
             self.ui.renderer.render(&mut pass, ui.primitives, &screen);
         }
         commands.push(encoder.finish());
-        queue.submit(commands);
-        queue.present(target);
-        Ok(Painted::Done)
+        PaintedImage { commands, target }
+    }
+
+    /// Frees textures that egui no longer uses; to be called at the end of each of its frames.
+    pub fn free_textures(&mut self, textures: &TexturesDelta) {
+        self.ui.free(textures);
+    }
+
+    /// Hands a painted image to the driver.
+    ///
+    /// # Errors
+    /// As for [`WindowPainter::acquire`].
+    pub fn show(&mut self, image: PaintedImage) -> Result<(), RenderError> {
+        self.gpu.queue.submit(image.commands);
+        self.gpu.queue.present(image.target);
+        self.gpu.check()
     }
 }
 

@@ -10,8 +10,10 @@ use std::time::Instant;
 /// Figures that grow while the viewer runs. Times in milliseconds.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
-    /// Processor time of the window's thread for each frame, with what the driver takes of it.
+    /// Processor time of the window's thread for each frame, without the driver's.
     pub window_cpu_ms: Vec<f32>,
+    /// Processor time that the driver takes of the window's thread for each frame, to give images and to take them.
+    pub driver_cpu_ms: Vec<f32>,
     /// Processor time of the stage's thread for each frame.
     pub stage_cpu_ms: Vec<f32>,
     /// From input to the frame that shows it.

@@ -316,8 +316,11 @@ fn a_path_is_recorded_played_and_saved() {
     person.waits_until(|viewer| !viewer.recorder.is_playing());
     let arrived = person.viewer().own_viewpoint();
     assert!((arrived.eye - end.eye).length() < 1e-9 && (arrived.target - end.target).length() < 1e-9);
-    person.clicks_on("Path");
-    person.clicks_on("Scene");
+    for button in ["Path", "Scene"] {
+        // The field beside it has the same name.
+        person.harness.get_by_role_and_label(egui::accesskit::Role::Button, button).click();
+        person.harness.run_steps(2);
+    }
     person.waits_until(|viewer| !viewer.jobs.is_writing());
     let mut written = person.files.written.lock().unwrap().clone();
     written.sort();

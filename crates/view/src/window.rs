@@ -11,7 +11,7 @@ use crate::viewer::Viewer;
 use egui::ViewportId;
 use gigalod_geom::ImageSize;
 use gigalod_render::RenderError;
-use gigalod_render::window::{Painted, UiPaint, WindowPainter};
+use gigalod_render::window::{Acquired, Shown, UiPaint, WindowPainter};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -143,6 +143,14 @@ impl ApplicationHandler<Wake> for App {
     }
 }
 
+/// What became of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Painted {
+    Done,
+    Hidden,
+    Again,
+}
+
 /// When the next frame is wanted.
 enum Next {
     Redraw,
@@ -202,15 +210,13 @@ impl Running {
         let mut output = self.context.run_ui(raw, |ui| viewer.ui(ui, size));
         self.input.handle_platform_output(&self.window, output.platform_output);
         let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
-        let ui = UiPaint {
-            primitives: &primitives,
-            textures: &output.textures_delta,
-            pixels_per_point: output.pixels_per_point,
-        };
         let shown = self.mailbox.shown();
-        let painted = self.painter.paint(shown.as_ref(), &ui);
+        let ui = UiPaint { primitives: &primitives, pixels_per_point: output.pixels_per_point };
+        self.painter.take_textures(&output.textures_delta);
+        let painted = self.paint(shown.as_ref(), &ui);
+        self.painter.free_textures(&output.textures_delta);
         output.textures_delta.clear();
-        let painted = match painted {
+        let (painted, driver_ms) = match painted {
             Err(RenderError::DeviceLost(_)) => {
                 self.recover()?;
                 return Ok(Next::Redraw);
@@ -223,7 +229,8 @@ impl Running {
         };
         let tally = &mut self.viewer.tally;
         if painted == Painted::Done {
-            tally.window_cpu_ms.push((thread_cpu_ms() - begun) as f32);
+            tally.window_cpu_ms.push((thread_cpu_ms() - begun - driver_ms) as f32);
+            tally.driver_cpu_ms.push(driver_ms as f32);
             if shown.is_some() {
                 self.losses = 0;
                 tally.first_frame_ms.get_or_insert(self.opened.elapsed().as_secs_f32() * 1e3);
@@ -240,6 +247,22 @@ impl Running {
             (Painted::Done, delay) if delay.is_zero() => Next::Redraw,
             (Painted::Done, delay) => Instant::now().checked_add(delay).map_or(Next::Wait, Next::At),
         })
+    }
+
+    /// Paints the window; how that went, and how much processor time the driver took for it.
+    fn paint(&mut self, shown: Option<&Shown>, ui: &UiPaint<'_>) -> Result<(Painted, f64), RenderError> {
+        let begun = thread_cpu_ms();
+        let acquired = self.painter.acquire()?;
+        let acquired_at = thread_cpu_ms();
+        let image = match acquired {
+            Acquired::Image(image) => image,
+            Acquired::Hidden => return Ok((Painted::Hidden, 0.0)),
+            Acquired::Again => return Ok((Painted::Again, 0.0)),
+        };
+        let painted = self.painter.paint(image, shown, ui);
+        let painted_at = thread_cpu_ms();
+        self.painter.show(painted)?;
+        Ok((Painted::Done, acquired_at - begun + thread_cpu_ms() - painted_at))
     }
 
     /// Opens the device anew, where it is lost.

@@ -23,8 +23,10 @@ struct ViewReport {
     fov: f64,
     /// Of the window.
     frames: usize,
-    /// Processor time of the window's thread for each of its frames, with what the driver takes of it.
+    /// Processor time of the window's thread for each of its frames, without the driver's.
     window_cpu_ms: Spread,
+    /// What the driver takes of it besides, to give images and to take them.
+    driver_cpu_ms: Spread,
     /// Processor time of the thread that selects, uploads and draws, for each of its frames.
     stage_cpu_ms: Spread,
     /// From input to the frame that shows it.
@@ -121,6 +123,7 @@ fn json(report: Report) -> ViewReport {
         fov: viewpoint.fov_deg,
         frames: tally.window_cpu_ms.len(),
         window_cpu_ms: spread(&tally.window_cpu_ms),
+        driver_cpu_ms: spread(&tally.driver_cpu_ms),
         stage_cpu_ms: spread(&tally.stage_cpu_ms),
         input_to_frame_ms: spread(&tally.input_to_frame_ms),
         first_frame_ms: tally.first_frame_ms,
