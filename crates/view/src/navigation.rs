@@ -5,8 +5,8 @@
 //! (look). All positions are `f64` in world space.
 //!
 //! What always holds, whatever goes in: the pose is finite; the eye is neither farther away than [`FARTHEST`] views of the whole
-//! nor nearer to its pivot than [`NEAREST`] of the diagonal; and of the *anchors*, points close to the model's surface, at least one
-//! is in the inner part of the picture ([`INNER`]), so that nobody loses the model. What would break that is done as far as it does
+//! nor nearer to its pivot than [`NEAREST`] of the diagonal; and of the *anchors*, balls that hold a part of the model's surface, at
+//! least one is wholly in the picture, so that nobody loses the model. What would break that is done as far as it does
 //! not, or moves the pivot towards the nearest anchor.
 
 use gigalod_geom::camera::UpAxis;
@@ -19,11 +19,11 @@ pub const FARTHEST: f64 = 12.0;
 /// Smallest distance of the eye from its pivot, in diagonals of the model.
 pub const NEAREST: f64 = 1e-7;
 
-/// Part of the picture's half height and half width in which an anchor must be.
-pub const INNER: f64 = 0.85;
-
-/// Most anchors that are kept; the last one is the point picked last.
+/// Most anchors that are kept, besides points that were picked.
 pub const MOST_ANCHORS: usize = 1024;
+
+/// Picked points that are kept as anchors.
+const MOST_PICKED: usize = 16;
 
 /// The eye never looks straight up or down: then up would be undefined. In radians.
 const STEEPEST: f64 = 89.9 * std::f64::consts::PI / 180.0;
@@ -33,6 +33,21 @@ const TURN: f64 = std::f64::consts::TAU;
 
 /// Radians that a drag over the picture's height turns.
 const TURN_PER_HEIGHT: f64 = std::f64::consts::PI;
+
+/// A ball that holds a part of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anchor {
+    /// Its middle; world space.
+    pub at: DVec3,
+    /// World units; 0 for a point of the surface itself.
+    pub radius: f64,
+}
+
+impl Anchor {
+    fn is_finite(&self) -> bool {
+        self.at.is_finite() && self.radius.is_finite()
+    }
+}
 
 /// Something a person does to the camera. Pixels are physical ones, y downwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +69,7 @@ pub enum Input {
         /// Where the cursor is.
         at_px: DVec2,
         /// The surface point under it, where one is known.
-        surface: Option<DVec3>,
+        surface: Option<Anchor>,
     },
     /// Turns the eye on the spot, so that what is far away follows the hand.
     Look {
@@ -66,16 +81,10 @@ pub enum Input {
         /// Along the view's axes.
         by: DVec3,
     },
-    /// Turns towards a point and makes it the pivot.
-    Pivot {
-        /// World space.
-        at: DVec3,
-    },
-    /// A surface point that a person pointed at: it counts as an anchor from now on.
-    Anchor {
-        /// World space.
-        at: DVec3,
-    },
+    /// Turns towards a point of the surface and makes it the pivot.
+    Pivot(Anchor),
+    /// A surface point that a person pointed at: it counts from now on, until many others have.
+    Anchor(Anchor),
     /// Back to the view of the whole.
     Home,
 }
@@ -85,8 +94,9 @@ pub enum Input {
 pub struct Navigation {
     bounds: Aabb,
     up_axis: UpAxis,
-    anchors: Vec<DVec3>,
-    picked: Option<DVec3>,
+    anchors: Vec<Anchor>,
+    /// The points picked last, oldest first.
+    picked: Vec<Anchor>,
     fov_y_rad: f64,
     /// Distance from which the whole model fills the picture.
     fit: f64,
@@ -112,14 +122,14 @@ impl Navigation {
         let camera = Camera::orbit(&bounds, up_axis, [0.0, 0.0], 1.0, fov_y_rad, size);
         let fit = (camera.eye - bounds.center()).length().max(f64::MIN_POSITIVE);
         let home = Pose { pivot: bounds.center(), azimuth: 0.0, elevation: 0.0, distance: fit };
-        Self { bounds, up_axis, anchors: Vec::new(), picked: None, fov_y_rad, fit, pose: home, home }
+        Self { bounds, up_axis, anchors: Vec::new(), picked: Vec::new(), fov_y_rad, fit, pose: home, home }
     }
 
-    /// Points close to the model's surface, all around it; without any, its middle and what was picked are all that is kept in view.
+    /// Balls all around the model; without any, its middle and what was picked are all that is kept in view.
     /// More than [`MOST_ANCHORS`] are thinned out.
-    pub fn set_anchors(&mut self, anchors: &[DVec3], size: ImageSize) {
+    pub fn set_anchors(&mut self, anchors: &[Anchor], size: ImageSize) {
         let step = anchors.len().div_ceil(MOST_ANCHORS).max(1);
-        self.anchors = anchors.iter().copied().step_by(step).filter(|anchor| anchor.is_finite()).collect();
+        self.anchors = anchors.iter().copied().step_by(step).filter(Anchor::is_finite).collect();
         self.keep(size);
     }
 
@@ -212,18 +222,19 @@ impl Navigation {
                 let by = (camera.right * by.x + camera.up * by.y + camera.forward * by.z) * before.distance;
                 self.take_as_far(size, |part| Pose { pivot: before.pivot + by * part, ..before });
             }
-            Input::Pivot { at } => {
-                if let Some(pose) = self.pose_of(self.eye(), at) {
-                    self.picked = Some(at);
+            Input::Pivot(anchor) => {
+                if let Some(pose) = self.pose_of(self.eye(), anchor.at).filter(|_| anchor.is_finite()) {
+                    self.pick(anchor);
                     self.take(pose);
                     self.keep(size);
                 }
             }
-            Input::Anchor { at } if at.is_finite() => {
-                self.picked = Some(at);
-                self.keep(size);
+            Input::Anchor(anchor) => {
+                if anchor.is_finite() {
+                    self.pick(anchor);
+                    self.keep(size);
+                }
             }
-            Input::Anchor { .. } => {}
             Input::Home => {
                 self.take(self.home);
                 self.keep(size);
@@ -232,16 +243,27 @@ impl Navigation {
         self.pose != before
     }
 
-    fn zoom(&mut self, factor: f64, at_px: DVec2, surface: Option<DVec3>, size: ImageSize) {
+    fn pick(&mut self, anchor: Anchor) {
+        if self.picked.last() == Some(&anchor) {
+            return;
+        }
+        if self.picked.len() == MOST_PICKED {
+            self.picked.remove(0);
+        }
+        self.picked.push(anchor);
+    }
+
+    fn zoom(&mut self, factor: f64, at_px: DVec2, surface: Option<Anchor>, size: ImageSize) {
         if !(factor.is_finite() && factor > 0.0 && at_px.is_finite()) {
             return;
         }
         if let Some(surface) = surface {
-            self.apply(&Input::Anchor { at: surface }, size);
+            self.apply(&Input::Anchor(surface), size);
         }
         let (before, camera) = (self.pose, self.camera(size));
         // What is under the cursor: a known point, or as far away as the pivot.
-        let depth = surface.map(|point| camera.view_point(point).z).filter(|depth| depth.is_finite() && *depth > 0.0);
+        let depth =
+            surface.map(|surface| camera.view_point(surface.at).z).filter(|depth| depth.is_finite() && *depth > 0.0);
         let depth = depth.unwrap_or(before.distance);
         let fixed = camera.eye + camera.ray_through(at_px) * depth;
         self.take_as_far(size, |part| {
@@ -305,38 +327,48 @@ impl Navigation {
         if self.is_in_view(&self.pose, size) {
             return;
         }
-        let from = self.pose;
         let nearest = self
             .all_anchors()
-            .min_by(|a, b| a.distance_squared(from.pivot).total_cmp(&b.distance_squared(from.pivot)))
-            .unwrap_or(self.bounds.center());
+            .min_by(|a, b| {
+                let distance = |anchor: &Anchor| anchor.at.distance_squared(self.pose.pivot);
+                distance(a).total_cmp(&distance(b))
+            })
+            .unwrap_or(Anchor { at: self.bounds.center(), radius: 0.0 });
+        // From so far away all of it is seen.
+        let tan = self.camera(size).tan_half_fov().min_element();
+        let enough = nearest.radius * (1.0 + tan * tan).sqrt() / tan * 1.001;
+        let from = Pose { distance: self.pose.distance.max(enough), ..self.pose };
         // The whole way always is enough: then the anchor is in the middle of the picture.
         let (mut bad, mut good) = (0.0, 1.0);
         for _ in 0..16 {
             let middle = (good + bad) * 0.5;
-            let pose = Pose { pivot: from.pivot.lerp(nearest, middle), ..from };
+            let pose = Pose { pivot: from.pivot.lerp(nearest.at, middle), ..from };
             *(if self.is_in_view(&pose, size) { &mut good } else { &mut bad }) = middle;
         }
-        self.pose.pivot = if good < 1.0 { from.pivot.lerp(nearest, good) } else { nearest };
+        let pivot = if good < 1.0 { from.pivot.lerp(nearest.at, good) } else { nearest.at };
+        self.pose = Pose { pivot, ..from };
     }
 
-    /// True where the eye is not too far away, and an anchor is in the inner part of the picture.
+    /// True where the eye is not too far away, and all of an anchor is in the picture.
     fn is_in_view(&self, pose: &Pose, size: ImageSize) -> bool {
         let eye = pose.pivot + to_eye(self.up_axis, pose) * pose.distance;
         if !eye.is_finite() || (eye - self.bounds.center()).length() > self.farthest() {
             return false;
         }
         let camera = Camera::look_at(eye, pose.pivot, self.up_axis.direction(), self.fov_y_rad, size);
-        let inner = camera.tan_half_fov() * INNER;
-        self.all_anchors().any(|anchor| {
-            let in_view = camera.view_point(anchor);
-            in_view.z > 0.0 && in_view.x.abs() <= inner.x * in_view.z && in_view.y.abs() <= inner.y * in_view.z
+        let tan = camera.tan_half_fov();
+        let slant = DVec2::new((1.0 + tan.x * tan.x).sqrt(), (1.0 + tan.y * tan.y).sqrt());
+        self.all_anchors().any(|Anchor { at, radius }| {
+            let in_view = camera.view_point(at);
+            in_view.z > 0.0
+                && in_view.x.abs() + radius * slant.x <= tan.x * in_view.z
+                && in_view.y.abs() + radius * slant.y <= tan.y * in_view.z
         })
     }
 
-    fn all_anchors(&self) -> impl Iterator<Item = DVec3> {
-        let middle = self.anchors.is_empty().then(|| self.bounds.center());
-        self.anchors.iter().copied().chain(middle).chain(self.picked)
+    fn all_anchors(&self) -> impl Iterator<Item = Anchor> {
+        let middle = self.anchors.is_empty().then(|| Anchor { at: self.bounds.center(), radius: 0.0 });
+        self.anchors.iter().copied().chain(middle).chain(self.picked.iter().copied())
     }
 
     fn farthest(&self) -> f64 {
@@ -384,8 +416,13 @@ mod tests {
     fn navigation(middle: DVec3, radius: f64) -> Navigation {
         let (bounds, anchors) = ball(middle, radius);
         let mut navigation = Navigation::new(bounds, UpAxis::Y, 0.7, SIZE);
+        let anchors: Vec<Anchor> = anchors.into_iter().map(|at| Anchor { at, radius: radius * 0.08 }).collect();
         navigation.set_anchors(&anchors, SIZE);
         navigation
+    }
+
+    fn on_surface(at: DVec3) -> Anchor {
+        Anchor { at, radius: 0.0 }
     }
 
     fn pixel(navigation: &Navigation, point: DVec3) -> DVec2 {
@@ -425,7 +462,7 @@ mod tests {
         let at_px = pixel(&navigation, surface);
         let mut distance = (navigation.eye() - surface).length();
         for _ in 0..60 {
-            assert!(navigation.apply(&Input::Zoom { factor: 0.8, at_px, surface: Some(surface) }, SIZE));
+            assert!(navigation.apply(&Input::Zoom { factor: 0.8, at_px, surface: Some(on_surface(surface)) }, SIZE));
             let now = (navigation.eye() - surface).length();
             assert!((now / distance - 0.8).abs() < 1e-3, "{now} of {distance}");
             distance = now;
@@ -453,10 +490,23 @@ mod tests {
         let mut navigation = navigation(DVec3::ZERO, 1.0);
         let at = DVec3::new(0.5, 0.5, 0.5_f64.sqrt());
         let distance = (navigation.eye() - at).length();
-        navigation.apply(&Input::Pivot { at }, SIZE);
+        navigation.apply(&Input::Pivot(on_surface(at)), SIZE);
         navigation.apply(&Input::Orbit { by_px: DVec2::new(50.0, -20.0) }, SIZE);
         assert!((pixel(&navigation, at) - DVec2::new(320.0, 240.0)).length() < 1e-9);
         assert!(((navigation.eye() - at).length() - distance).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nobody_comes_so_near_that_there_is_nothing_left_to_see() {
+        let mut navigation = navigation(DVec3::ZERO, 1.0);
+        let surface = Anchor { at: DVec3::Z, radius: 0.01 };
+        navigation.set_anchors(&[surface], SIZE);
+        for _ in 0..100 {
+            let at_px = pixel(&navigation, surface.at);
+            navigation.apply(&Input::Zoom { factor: 0.7, at_px, surface: Some(surface) }, SIZE);
+        }
+        let depth = (navigation.eye() - surface.at).length();
+        assert!((0.02..0.04).contains(&depth), "{depth}: the ball just fills the picture's height");
     }
 
     fn any_input() -> impl Strategy<Value = Input> {
@@ -473,11 +523,11 @@ mod tests {
                 factor,
                 at_px,
                 // On the surface, as picked points are.
-                surface: direction.map(|direction| direction.normalize_or(DVec3::X)),
+                surface: direction.map(|direction| on_surface(direction.normalize_or(DVec3::X))),
             }),
             px().prop_map(|by_px| Input::Look { by_px }),
             point().prop_map(|by| Input::Fly { by: by * 10.0 }),
-            point().prop_map(|at| Input::Pivot { at: at.normalize_or(DVec3::X) }),
+            point().prop_map(|at| Input::Pivot(on_surface(at.normalize_or(DVec3::X)))),
             Just(Input::Home),
         ]
     }
@@ -491,17 +541,20 @@ mod tests {
             let middle = DVec3::new(7.0, -3.0, 11.0) * scale;
             let mut navigation = navigation(middle, scale);
             let whole = (navigation.eye() - middle).length();
-            let surface = sphere(middle, scale, 5000);
+            let mut surface = sphere(middle, scale, 5000);
             for (input, width, height) in inputs {
                 // Points of inputs are those of a unit ball around the origin.
-                let place = |point: DVec3| middle + point * scale;
+                let place = |anchor: Anchor| on_surface(middle + anchor.at * scale);
                 let input = match input {
                     Input::Zoom { factor, at_px, surface } => {
                         Input::Zoom { factor, at_px, surface: surface.map(place) }
                     }
-                    Input::Pivot { at } => Input::Pivot { at: place(at) },
+                    Input::Pivot(at) => Input::Pivot(place(at)),
                     other => other,
                 };
+                if let Input::Pivot(picked) | Input::Zoom { surface: Some(picked), .. } = &input {
+                    surface.push(picked.at);
+                }
                 let size = ImageSize { width, height };
                 navigation.apply(&Input::Orbit { by_px: DVec2::ZERO }, size);
                 navigation.apply(&input, size);

@@ -6,6 +6,7 @@
 //!
 //! What always holds: the true surface lies within [`Hit::radius`] of the ray near the hit; hostile files end the search.
 
+use crate::navigation::Anchor;
 use gigalod_format::FormatError;
 use gigalod_format::splats::{FamilyPlace, Node, Page, PageId, SplatFile, WordIndex};
 use gigalod_geom::Sphere;
@@ -176,11 +177,11 @@ impl Pages {
         Ok(hit.map(|hit| Hit { t: hit.t * unit, radius: hit.radius }))
     }
 
-    /// Points close to the surface, all over the model, world by `place`: middles of the smallest balls of the root's page.
+    /// Balls that hold parts of the surface, all over the model, in model space: the smallest of the root's page.
     ///
     /// # Errors
     /// The root's page cannot be read.
-    pub fn anchors(&mut self, file: &SplatFile, most: usize) -> Result<Vec<DVec3>, FormatError> {
+    pub fn anchors(&mut self, file: &SplatFile, most: usize) -> Result<Vec<Anchor>, FormatError> {
         let root = file.skeleton().root();
         let page = self.page(file, PageId(0))?;
         let mut found = Vec::new();
@@ -205,7 +206,10 @@ impl Pages {
                 let below = family.filter(|below| children.count > 0 && below.page == PageId(0));
                 match below.and_then(|below| page.family_word(below.family)) {
                     Some(first) => stack.push((ball, WordIndex(first.0.saturating_add(skipped)), children.count)),
-                    None => found.push(root.origin + ball.center.as_dvec3()),
+                    None => {
+                        let at = root.origin + ball.center.as_dvec3();
+                        found.push(Anchor { at, radius: f64::from(ball.radius) });
+                    }
                 }
             }
         }

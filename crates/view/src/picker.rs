@@ -6,6 +6,7 @@
 
 use crate::host::{Host, Model, Work};
 use crate::mailbox::ModelKey;
+use crate::navigation::Anchor;
 use crate::pick::{Hit, Pages, Ray};
 use gigalod_geom::Camera;
 use gigalod_runtime::Similarity;
@@ -38,12 +39,19 @@ pub(crate) enum Question {
 /// What the thread has to say.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Answer {
-    /// World-space points close to the surface of all models.
-    Anchors(Vec<DVec3>),
+    /// Balls that hold parts of the surface of all models; world space.
+    Anchors(Vec<Anchor>),
     /// `None` where there is only background.
     Point { purpose: Purpose, at_px: DVec2, found: Option<Found> },
     /// Something is wrong with a file.
     Problem(String),
+}
+
+impl Found {
+    /// What the camera may be held by: the point, with all that it may be off.
+    pub(crate) fn anchor(&self) -> Anchor {
+        Anchor { at: self.point, radius: self.uncertain }
+    }
 }
 
 /// A point of the surface.
@@ -128,9 +136,12 @@ impl<W: Fn() + Send + Sync + 'static> Picker<W> {
         let (mut anchors, mut problems) = (Vec::new(), Vec::new());
         for Open { model, pages } in self.open.values_mut() {
             match pages.anchors(&model.file, ANCHORS / model.placements.len().clamp(1, ANCHORS)) {
-                Ok(points) => {
-                    let all = model.placements.iter().flat_map(|place| points.iter().map(|point| world(place, *point)));
-                    anchors.extend(all);
+                Ok(balls) => {
+                    let all = model.placements.iter().flat_map(|place| balls.iter().map(move |ball| (place, ball)));
+                    anchors.extend(all.map(|(place, Anchor { at, radius })| Anchor {
+                        at: world(place, *at),
+                        radius: radius * place.scale,
+                    }));
                 }
                 Err(error) => problems.push(format!("{}: {error}", model.source.display())),
             }

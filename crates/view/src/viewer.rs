@@ -7,14 +7,14 @@ use crate::host::{Host, Model, Opened, OpenedScene, up_of};
 use crate::jobs::{Finished, Jobs};
 use crate::mailbox::{Figures, Mailbox, ModelKey, News, Order, Wish};
 use crate::measure::Measuring;
-use crate::navigation::{Input, Navigation};
+use crate::navigation::{Anchor, Input, Navigation};
 use crate::picker::{Answer, Purpose, Question};
 use crate::recorder::{Recorder, Viewpoint};
 use crate::report::Tally;
 use crate::settings::{FirstLook, Options, Settings};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera, ImageSize};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
@@ -60,7 +60,7 @@ pub(crate) struct Viewer {
     /// A drag without modifiers turns the eye on the spot.
     pub(crate) flies: bool,
     /// A surface point that was found under the cursor, and where that was.
-    pub(crate) under_cursor: Option<(DVec2, DVec3)>,
+    pub(crate) under_cursor: Option<(DVec2, Anchor)>,
     pub(crate) size: ImageSize,
     pub(crate) adapter: String,
     pub(crate) wants_recovery: bool,
@@ -278,16 +278,16 @@ impl Viewer {
             Answer::Problem(problem) => self.notice_error(&problem),
             Answer::Point { purpose: Purpose::Measure(number), found, .. } => {
                 if let Some(found) = found {
-                    self.navigation.apply(&Input::Anchor { at: found.point }, self.size);
+                    self.navigation.apply(&Input::Anchor(found.anchor()), self.size);
                 }
                 self.measuring.found(number, found);
             }
             Answer::Point { purpose: Purpose::Pivot, found: Some(found), .. } => {
-                self.navigation.apply(&Input::Pivot { at: found.point }, self.size);
+                self.navigation.apply(&Input::Pivot(found.anchor()), self.size);
             }
             Answer::Point { purpose: Purpose::Zoom, at_px, found: Some(found) } => {
-                self.under_cursor = Some((at_px, found.point));
-                self.navigation.apply(&Input::Anchor { at: found.point }, self.size);
+                self.under_cursor = Some((at_px, found.anchor()));
+                self.navigation.apply(&Input::Anchor(found.anchor()), self.size);
             }
             Answer::Point { .. } => {}
         }
@@ -383,8 +383,11 @@ impl Viewer {
         self.notices.push(Notice { text: text.to_string(), is_error: false, until: now + 6.0 });
     }
 
-    /// Tells an error.
+    /// Tells an error, once as long as it is shown.
     pub(crate) fn notice_error(&mut self, text: &str) {
+        if self.notices.iter().any(|notice| notice.text == text) {
+            return;
+        }
         self.tally.problems.push(text.to_string());
         self.notices.push(Notice { text: text.to_string(), is_error: true, until: f64::INFINITY });
     }

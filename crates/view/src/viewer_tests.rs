@@ -296,6 +296,11 @@ fn whoever_drags_at_random_does_not_lose_the_model() {
                 person.clicks(from);
             }
         }
+        // Picks come from another thread.
+        for _ in 0..3 {
+            std::thread::sleep(Duration::from_millis(2));
+            person.harness.run_steps(1);
+        }
         assert!(person.sees_the_statue(), "lost in step {step}: {:?}", person.viewer().own_viewpoint());
     }
 }

@@ -21,6 +21,9 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::window::{Window, WindowId};
 
+/// Frames that change nothing come at most so often.
+const LEAST_DELAY: Duration = Duration::from_millis(8);
+
 /// A device that is lost so often in a row stays lost.
 const MOST_LOSSES: u32 = 3;
 
@@ -87,6 +90,12 @@ struct Running {
     size: ImageSize,
     losses: u32,
     opened: Instant,
+    /// Number and size of the picture that the window shows, and what lies over it.
+    painted: Option<(u64, ImageSize)>,
+    painted_shapes: Vec<egui::epaint::ClippedShape>,
+    /// A frame was asked for here, and not by the system, which has lost what the window showed.
+    asked: bool,
+    must_paint: bool,
 }
 
 impl ApplicationHandler<Wake> for App {
@@ -104,26 +113,30 @@ impl ApplicationHandler<Wake> for App {
     }
 
     fn user_event(&mut self, _: &ActiveEventLoop, _: Wake) {
-        if let Some(running) = &self.running {
-            running.window.request_redraw();
+        if let Some(running) = &mut self.running {
+            running.ask();
         }
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(running) = &mut self.running else { return };
         if running.input.on_window_event(&running.window, &event).repaint {
-            running.window.request_redraw();
+            running.ask();
         }
         match event {
             WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => {
                 running.size = ImageSize { width: size.width, height: size.height };
                 running.painter.resize(running.size);
-                running.window.request_redraw();
+                running.must_paint = true;
+                running.ask();
             }
-            WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => running.window.request_redraw(),
+            WindowEvent::ScaleFactorChanged { .. } | WindowEvent::Occluded(false) => {
+                running.must_paint = true;
+                running.ask();
+            }
             WindowEvent::RedrawRequested => match running.frame() {
-                Ok(Next::Redraw) => running.window.request_redraw(),
+                Ok(Next::Redraw) => running.ask(),
                 Ok(Next::At(instant)) => events.set_control_flow(ControlFlow::WaitUntil(instant)),
                 Ok(Next::Wait) => events.set_control_flow(ControlFlow::Wait),
                 Ok(Next::End) => events.exit(),
@@ -137,10 +150,15 @@ impl ApplicationHandler<Wake> for App {
     }
 
     fn new_events(&mut self, _: &ActiveEventLoop, cause: winit::event::StartCause) {
-        if let (winit::event::StartCause::ResumeTimeReached { .. }, Some(running)) = (cause, &self.running) {
-            running.window.request_redraw();
+        if let (winit::event::StartCause::ResumeTimeReached { .. }, Some(running)) = (cause, &mut self.running) {
+            running.ask();
         }
     }
+}
+
+/// How soon egui wants its next frame.
+fn repaint_delay(output: &egui::FullOutput) -> Duration {
+    output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay)
 }
 
 /// What became of a frame.
@@ -196,19 +214,54 @@ impl Running {
         let input = egui_winit::State::new(context.clone(), ViewportId::ROOT, &*window, scale, None, most);
         let stage = Some(stage);
         window.request_redraw();
-        Ok(Self { window, painter, context, input, viewer, mailbox, stage, size, losses: 0, opened })
+        Ok(Self {
+            window,
+            painter,
+            context,
+            input,
+            viewer,
+            mailbox,
+            stage,
+            size,
+            losses: 0,
+            opened,
+            painted: None,
+            painted_shapes: Vec::new(),
+            asked: true,
+            must_paint: false,
+        })
     }
 
-    /// One frame of the window.
+    /// Asks for a frame.
+    fn ask(&mut self) {
+        self.asked = true;
+        self.window.request_redraw();
+    }
+
+    /// One frame of the window; it is painted where it differs from the last one.
     fn frame(&mut self) -> Result<Next, ViewError> {
         let begun = thread_cpu_ms();
+        self.must_paint |= !std::mem::take(&mut self.asked);
         if std::mem::take(&mut self.viewer.wants_recovery) {
             self.recover()?;
         }
         let raw = self.input.take_egui_input(&self.window);
         let (viewer, size) = (&mut self.viewer, self.size);
         let mut output = self.context.run_ui(raw, |ui| viewer.ui(ui, size));
+        let delay = repaint_delay(&output);
         self.input.handle_platform_output(&self.window, output.platform_output);
+        let picture = (self.viewer.figures.frames, size);
+        let is_same = !std::mem::take(&mut self.must_paint)
+            && output.textures_delta.is_empty()
+            && self.painted == Some(picture)
+            && self.painted_shapes == output.shapes;
+        if is_same {
+            // A person drags, and the stage has not caught up: painting the same again would only take its time.
+            let next = Instant::now().checked_add(delay.max(LEAST_DELAY)).map_or(Next::Wait, Next::At);
+            return Ok(if self.viewer.wants_to_quit { Next::End } else { next });
+        }
+        self.painted = None;
+        self.painted_shapes.clone_from(&output.shapes);
         let primitives = self.context.tessellate(output.shapes, output.pixels_per_point);
         let shown = self.mailbox.shown();
         let ui = UiPaint { primitives: &primitives, pixels_per_point: output.pixels_per_point };
@@ -229,6 +282,7 @@ impl Running {
         };
         let tally = &mut self.viewer.tally;
         if painted == Painted::Done {
+            self.painted = Some(picture);
             tally.window_cpu_ms.push((thread_cpu_ms() - begun - driver_ms) as f32);
             tally.driver_cpu_ms.push(driver_ms as f32);
             if shown.is_some() {
@@ -240,7 +294,6 @@ impl Running {
         if self.viewer.wants_to_quit {
             return Ok(Next::End);
         }
-        let delay = output.viewport_output.get(&ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
         Ok(match (painted, delay) {
             (Painted::Hidden, _) => Next::Wait,
             (Painted::Again, _) => Next::Redraw,
@@ -267,6 +320,7 @@ impl Running {
 
     /// Opens the device anew, where it is lost.
     fn recover(&mut self) -> Result<(), ViewError> {
+        self.must_paint = true;
         if !self.painter.gpu().is_lost() {
             self.mailbox.order(Order::MoveTo(Box::new(self.painter.gpu().clone())));
             return Ok(());

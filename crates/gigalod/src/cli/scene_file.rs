@@ -257,6 +257,7 @@ pub(crate) fn places(places: &Places) -> Result<Vec<Similarity>, CliError> {
 }
 
 /// Writes a scene; files below its folder by their relative names, others by their absolute ones.
+#[cfg_attr(not(feature = "view"), allow(dead_code, reason = "it is the viewer that saves scenes"))]
 pub(crate) fn write(path: &Path, scene: &SceneDescription) -> Result<(), CliError> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder.canonicalize().map_err(|error| CliError::write(path, &error))?;
