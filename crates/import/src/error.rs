@@ -116,6 +116,12 @@ impl ImportError {
         Self(Box::new(Report { problem, place }))
     }
 
+    /// Of a material without a texture.
+    pub(crate) fn no_picture(material: u32) -> Self {
+        let source = io::Error::new(io::ErrorKind::NotFound, format!("material {material} has no picture"));
+        Self::new(Problem::Io { source }, None)
+    }
+
     pub(crate) fn malformed(expected: impl Into<String>, found: impl Into<String>, place: Place) -> Self {
         Self::new(Problem::Malformed { expected: expected.into(), found: found.into() }, Some(place))
     }

@@ -30,7 +30,7 @@ mod watch;
 mod weld;
 pub mod xyz;
 
-pub use batch::{Attributes, Batch, CornerBatch, Material, Texture, VertexBatch, read_all};
+pub use batch::{Attributes, Batch, CornerBatch, Mapping, Material, Texture, VertexBatch, Wrap, read_all};
 pub use error::{ImportError, Item, Place, Position, Problem};
 pub use open::{open, open_with};
 pub use side::{NoSideFiles, SideFiles};
@@ -56,6 +56,14 @@ pub trait ModelStream: Send {
     /// Materials that triangles of the batches so far have named, by number; there may be more after the next batch.
     fn materials(&self) -> &[Material] {
         &[]
+    }
+
+    /// The file of a material's texture, PNG or JPEG, by the material's number; to be asked for after the last batch.
+    ///
+    /// # Errors
+    /// The material has no texture, or its file cannot be had.
+    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
+        Err(ImportError::no_picture(material))
     }
 
     /// Number of vertices, where the file says so before they come. Checked against what comes.

@@ -73,6 +73,10 @@ impl ModelStream for Watched {
         self.stream.materials()
     }
 
+    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
+        self.stream.open_picture(material)
+    }
+
     fn declared_vertices(&self) -> Option<u64> {
         self.stream.declared_vertices()
     }

@@ -239,7 +239,8 @@ fn textured_materials_come_with_texture_coordinates() {
     assert_eq!(all.tex_coords, [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]; 2].concat());
     assert_eq!(all.corners.tex_coords, [[0, 1, 2], [0, 2, 3], [none; 3], [none; 3], [4, 5, 6], [4, 6, 7]]);
     assert_eq!(all.corners.materials, [0, 0, none, none, 1, 1]);
-    let material = |texture| Material { name: String::new(), color: [255; 3], texture: Some(texture) };
+    let material =
+        |texture| Material { is_in_vertices: true, texture: Some(texture), ..Material::plain(String::new()) };
     assert_eq!(stream.materials(), [material(Texture::File("a wall.jpg".to_owned())), material(Texture::Embedded(0))]);
 }
 
