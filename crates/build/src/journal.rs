@@ -41,7 +41,7 @@ pub(crate) struct Extent {
 }
 
 /// First word of each journal; the number changes with the meaning of journals or spools.
-const MAGIC: &str = "gigalod-build-journal-2";
+const MAGIC: &str = "gigalod-build-journal-3";
 
 impl Journal {
     pub(crate) fn to_bytes(&self) -> Vec<u8> {

@@ -32,6 +32,9 @@ pub struct Options {
     pub threads: usize,
     /// Overrides the format's convention.
     pub up: Option<UpAxis>,
+    /// Triangles whose bounding circle is larger than this, in model units, are diced into samples that far apart. `None`: what
+    /// suits the model, as [`splats`] says.
+    pub spacing: Option<f64>,
     /// What is built. Where it is given, a build that does not fit into memory can be continued by another process: what it
     /// has lies in [`work_folder`].
     pub input: Option<InputIdentity>,
@@ -46,6 +49,6 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { memory_bytes: 2 << 30, threads: 0, up: None, input: None, resume: false }
+        Self { memory_bytes: 2 << 30, threads: 0, up: None, spacing: None, input: None, resume: false }
     }
 }

@@ -40,6 +40,17 @@ pub struct LevelSummary {
     pub max_error: f64,
 }
 
+/// How large triangles were cut into samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Dicing {
+    /// No sample stands for more than a square of this size; model units.
+    pub spacing: f64,
+    /// Triangles that were cut, or became a sample each.
+    pub triangles: u64,
+    /// Leaves that they became; all others are vertices.
+    pub samples: u64,
+}
+
 /// Facts about a file and how it was built. Never a time, a path or a machine: same input and options, same bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {
@@ -64,6 +75,9 @@ pub struct Metadata {
     pub bounds: Bounds,
     /// Of `"normals"`, `"colors"`, …: what the nodes carry.
     pub attributes: Vec<String>,
+    /// How large triangles were cut, if any were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dicing: Option<Dicing>,
     /// Coarse to fine.
     pub per_level: Vec<LevelSummary>,
 }

@@ -110,7 +110,7 @@ pub enum Wrap {
 }
 
 /// Where the picture of a texture is.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Texture {
     /// A file beside the model, by the name that the model has for it.
     File(String),

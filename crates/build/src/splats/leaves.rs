@@ -4,11 +4,15 @@
 //! at a triangle's corners cover it (splats paper, section 2.2). The normal is the mesh's own, or else the mean of the
 //! triangles' normals weighted by their angles at the vertex (Thürmer & Wüthrich, *Computing vertex normals from polygonal
 //! facets*, JGT 1998). The cone holds the normals of all triangles around the vertex, seen from the normal as quantised.
+//!
+//! Triangles that are diced (`dice/`) give nothing to their vertices; a vertex of no other triangle is no leaf.
 
+use super::dice::{self, Dice, Dicing, Kind, Sizes};
 use super::facets::{self, Facet};
 use super::join::Corners;
 use super::mesh::{Corner, Mesh, Positions};
 use super::orientation::Orientation;
+use super::paint::{self, Paint};
 use super::plan::MemoryPlan;
 use super::reorder;
 use crate::BuildError;
@@ -63,13 +67,14 @@ pub(super) struct Leaves {
     pub(super) bounds: Aabb,
     pub(super) closed: bool,
     pub(super) has_colors: bool,
+    pub(super) dicing: Option<gigalod_format::Dicing>,
 }
 
 /// What a vertex gathers from its triangles.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Gathered {
-    /// −1 until the vertex is referenced.
+    /// [`UNREFERENCED`] until a triangle that is not diced has come.
     radius: f32,
     /// In steps of 2⁻¹⁶: integers, so that the order of the triangles does not matter.
     normal: [i32; 3],
@@ -85,6 +90,9 @@ struct Aspect {
     spread: u16,
 }
 
+/// Radius of what no triangle has come to yet.
+const UNREFERENCED: f32 = -1.0;
+
 /// A triangle's normal in steps of 1/32767; zero where it has no area.
 type FaceNormal = [i16; 3];
 
@@ -94,34 +102,102 @@ fn steps_of(value: f32) -> i16 {
 }
 
 /// More than the steps of a [`FaceNormal`] can change a cosine by.
-const STEPS: f32 = 6e-5;
+pub(super) const STEPS: f32 = 6e-5;
 
 /// Triangles that add up their volumes one after the other; batches hold whole strides, so that the sum does not depend on them.
 const STRIDE: usize = 4096;
 
-pub(super) fn from_mesh(mut mesh: Mesh, plan: &MemoryPlan<'_>, phases: &Phases<'_>) -> Result<Leaves, BuildError> {
+/// `asked` is the spacing that the user asks for, if any.
+pub(super) fn from_mesh(
+    mut mesh: Mesh,
+    asked: Option<f64>,
+    plan: &MemoryPlan<'_>,
+    phases: &Phases<'_>,
+) -> Result<Leaves, BuildError> {
     let vertex_count = mesh.positions.len();
     phases.begin("radii and normals", mesh.triangles.len());
     reorder::by_space(&mut mesh);
-    let (gathered, faces, orientation) = match &mesh.positions {
-        Positions::Narrow(positions) => gather(&mesh.triangles, positions, plan, phases),
-        Positions::Wide(positions) => gather(&mesh.triangles, positions, plan, phases),
-    }
-    .map_err(BuildError::Scratch)?;
-
-    phases.begin("cones", mesh.triangles.len());
-    let (mut aspects, bounds) = orient(&mesh, &gathered, plan).map_err(BuildError::Scratch)?;
+    let Gathering { mut gathered, mut faces, orientation, sizes } =
+        gather(&mesh, None, plan, phases).map_err(BuildError::Scratch)?;
+    let Survey { bounds, smooth_share } = survey(&mesh, &gathered).map_err(BuildError::Scratch)?;
     let extent = bounds.extent().max_element();
     if extent.is_nan() || extent > 1e30 {
         return Err(BuildError::TooWide { extent });
     }
+    let texels = match &mesh.paint {
+        Some(paint) => count_texels(paint, plan).map_err(BuildError::Scratch)?,
+        None => 0,
+    };
+    let dicing = sizes.dicing(Kind { smooth_share, is_painted: mesh.paint.is_some(), texels }, asked);
+    if let (Some(dicing), Some(spacing)) = (dicing, asked) {
+        let samples = sizes.samples(dicing);
+        if samples >= f64::from(1u32 << 31) {
+            return Err(BuildError::TooFine { spacing, samples });
+        }
+    }
+    if dicing.is_some() {
+        phases.begin("radii and normals of small triangles", mesh.triangles.len());
+        // What was gathered would be in the way of what is.
+        drop((gathered, faces));
+        Gathering { gathered, faces, .. } = gather(&mesh, dicing, plan, phases).map_err(BuildError::Scratch)?;
+    }
+
+    phases.begin("cones", mesh.triangles.len());
+    let mut aspects = orient(&mesh, &gathered, plan).map_err(BuildError::Scratch)?;
     widen_cones(&mesh.triangles, &faces, &mut aspects, plan, phases).map_err(BuildError::Scratch)?;
     drop(faces);
 
-    phases.begin("leaves", vertex_count);
     let origin = bounds.center();
-    let (leaves, has_colors) = collect(mesh, &gathered, &aspects, origin, plan, phases).map_err(BuildError::Scratch)?;
-    Ok(Leaves { leaves, origin, bounds, closed: orientation.is_closed(), has_colors })
+    let has_colors = mesh.colors.len() > 0 || mesh.paint.is_some();
+    let (mut samples, mut diced) = (None, None);
+    if let Some(dicing) = dicing {
+        let dice = Dice { mesh: &mesh, dicing, origin };
+        phases.begin("grids", mesh.triangles.len());
+        let count = dice::count(&dice, plan, phases).map_err(BuildError::Scratch)?;
+        plan.expect_leaves(count.cells + vertex_count, mesh.spooled_bytes());
+        phases.begin("dice", count.cells);
+        let mut leaves = Spool::named(&plan.place(), LEAVES).map_err(BuildError::Scratch)?;
+        leaves.expect(count.cells);
+        dice::dice(&dice, &mut leaves, plan, phases).map_err(BuildError::Scratch)?;
+        let (spacing, triangles, samples_made) = (dicing.spacing, count.triangles, leaves.len());
+        diced = Some(gigalod_format::Dicing { spacing, triangles, samples: samples_made });
+        samples = Some(leaves);
+    }
+    phases.begin("leaves", vertex_count);
+    let leaves = collect(mesh, &gathered, &aspects, samples, origin, plan, phases).map_err(BuildError::Scratch)?;
+    match leaves.len() {
+        // All is masked out.
+        0 => Err(BuildError::Nothing),
+        found if found >= 1 << 31 => Err(BuildError::TooManyVertices { found }),
+        _ => Ok(Leaves { leaves, origin, bounds, closed: orientation.is_closed(), has_colors, dicing: diced }),
+    }
+}
+
+/// Name of the spool.
+const LEAVES: &str = "leaves";
+
+/// Texels that triangles show, each as often as it is shown.
+fn count_texels(paint: &Paint, plan: &MemoryPlan<'_>) -> io::Result<u64> {
+    let (mut looks, mut coords, mut texels) = (Vec::new(), Vec::new(), 0u64);
+    if paint.tex_coords.len() == 0 {
+        return Ok(0);
+    }
+    paint.corners.for_each_piece(plan.diced_at_once(), |start, corners| {
+        paint.materials.read_vec(start, corners.len(), &mut looks)?;
+        let known = corners.as_flattened().iter().map(|number| if *number == paint::NONE { 0 } else { *number });
+        Corners::of_vertices(known.collect()).fetch(&paint.tex_coords, &mut coords)?;
+        for ((coords, look), numbers) in coords.as_chunks::<3>().0.iter().zip(&looks).zip(corners) {
+            let Some(look) = paint.looks.get(*look as usize) else { continue };
+            let Some(picture) = look.picture.filter(|_| !numbers.contains(&paint::NONE)) else { continue };
+            let size = paint.pictures[picture as usize].levels[0].size;
+            let [[ax, ay], [bx, by], [cx, cy]] = coords.map(|coord| look.texel(coord.map(f64::from), size));
+            let area = ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)).abs() * 0.5;
+            // In whole numbers, so that their order does not show; casting saturates.
+            texels = texels.saturating_add(area as u64);
+        }
+        Ok(())
+    })?;
+    Ok(texels)
 }
 
 /// A batch of triangles, measured; nothing of it is gathered yet.
@@ -135,11 +211,17 @@ struct Stride {
     facets: Vec<Facet>,
     faces: Vec<FaceNormal>,
     orientation: Orientation,
+    sizes: Option<Sizes>,
 }
 
 impl Measured {
-    /// `anchor` is the first corner of all.
-    fn of<C: Corner>(triangles: &[[u32; 3]], positions: &Spool<C>, anchor: &mut Option<C>) -> io::Result<Self> {
+    /// `anchor` is the first corner of all. Sizes are counted until it is known what is `diced`.
+    fn of<C: Corner>(
+        triangles: &[[u32; 3]],
+        positions: &Spool<C>,
+        diced: Option<Dicing>,
+        anchor: &mut Option<C>,
+    ) -> io::Result<Self> {
         let (mut corners, mut fetched) = (Corners::of(triangles), Vec::new());
         corners.fetch(positions, &mut fetched)?;
         let corner_positions: &[[C; 3]] = fetched.as_chunks().0;
@@ -153,8 +235,16 @@ impl Measured {
                 for (triangle, facet) in triangles.iter().zip(&facets) {
                     orientation.add(*triangle, facet.six_volumes);
                 }
+                let sizes = diced.is_none().then(|| {
+                    let mut sizes = Sizes::default();
+                    facets.iter().for_each(|facet| sizes.add(facet.radius, facet.area_share));
+                    sizes
+                });
+                for facet in facets.iter_mut().filter(|facet| diced.is_some_and(|it| it.is_diced(facet.radius))) {
+                    *facet = Facet { radius: UNREFERENCED, ..Facet::default() };
+                }
                 let faces = facets.iter().map(|facet| facet.normal.to_array().map(steps_of)).collect();
-                Stride { facets, faces, orientation }
+                Stride { facets, faces, orientation, sizes }
             })
             .collect();
         Ok(Self { corners, strides })
@@ -173,15 +263,34 @@ impl Measured {
     }
 }
 
-/// First look at all triangles: each vertex' radius and normal, each triangle's normal, and whether all is closed.
-fn gather<C: Corner>(
+/// What a look at all triangles gives.
+struct Gathering {
+    gathered: Spool<Gathered>,
+    faces: Spool<FaceNormal>,
+    orientation: Orientation,
+    /// Of all triangles, until it is known what is diced.
+    sizes: Sizes,
+}
+
+fn gather(mesh: &Mesh, diced: Option<Dicing>, plan: &MemoryPlan<'_>, phases: &Phases<'_>) -> io::Result<Gathering> {
+    match &mesh.positions {
+        Positions::Narrow(positions) => gather_from(&mesh.triangles, positions, diced, plan, phases),
+        Positions::Wide(positions) => gather_from(&mesh.triangles, positions, diced, plan, phases),
+    }
+}
+
+/// First look at all triangles: each vertex' radius and normal, each triangle's normal, whether all is closed, and sizes. Where it is
+/// known what is diced, the same but for that, and without sizes.
+fn gather_from<C: Corner>(
     triangles: &Spool<[u32; 3]>,
     positions: &Spool<C>,
+    diced: Option<Dicing>,
     plan: &MemoryPlan<'_>,
     phases: &Phases<'_>,
-) -> io::Result<(Spool<Gathered>, Spool<FaceNormal>, Orientation)> {
+) -> io::Result<Gathering> {
     let mut gathered = Spool::new(&plan.place())?;
-    fill(&mut gathered, positions.len(), Gathered { radius: -1.0, normal: [0; 3] })?;
+    fill(&mut gathered, positions.len(), Gathered { radius: UNREFERENCED, normal: [0; 3] })?;
+    let mut sizes = Sizes::default();
     let mut faces = Spool::new(&plan.place())?;
     faces.expect(triangles.len());
     let mut orientation = Orientation::default();
@@ -191,31 +300,57 @@ fn gather<C: Corner>(
     for_each_batch(triangles, plan, |start, triangles| {
         let before = std::mem::take(&mut measured);
         let (gathering, measuring) =
-            rayon::join(|| before.gather(&mut gathered), || Measured::of(triangles, positions, &mut anchor));
+            rayon::join(|| before.gather(&mut gathered), || Measured::of(triangles, positions, diced, &mut anchor));
         gathering?;
         measured = measuring?;
-        for Stride { faces: normals, orientation: stride, .. } in &measured.strides {
+        for Stride { faces: normals, orientation: stride, sizes: counted, .. } in &measured.strides {
             faces.push(normals)?;
             orientation.merge(stride);
+            counted.iter().for_each(|counted| sizes.merge(counted));
         }
         phases.at(start);
         Ok(())
     })?;
     measured.gather(&mut gathered)?;
-    Ok((gathered, faces, orientation))
+    Ok(Gathering { gathered, faces, orientation, sizes })
 }
 
-/// The normal of each vertex: its own where it has one, else what it gathered; and the bounds of all that are referenced.
-fn orient(mesh: &Mesh, gathered: &Spool<Gathered>, plan: &MemoryPlan<'_>) -> io::Result<(Spool<Aspect>, Aabb)> {
-    let mut aspects = Spool::new(&plan.place())?;
-    aspects.expect(gathered.len());
+/// What vertices have gathered, as a whole.
+struct Survey {
+    /// Of all that are referenced.
+    bounds: Aabb,
+    /// Share of them that lie inside a smooth surface: triangles all around, in about one direction.
+    smooth_share: f64,
+}
+
+/// Sum of the normals of triangles around a vertex, weighted by their angles in radians, from which on it is inside a smooth surface:
+/// of a flat one, the sum is a full turn; at the corner of a house, less than half of one.
+const SMOOTH: f32 = 0.75 * std::f32::consts::TAU * 65_536.0;
+
+fn survey(mesh: &Mesh, gathered: &Spool<Gathered>) -> io::Result<Survey> {
     let mut bounds = Aabb::EMPTY;
-    let has_own = mesh.normals.len() > 0;
-    let (mut own, mut at) = (Vec::new(), Vec::new());
+    let (mut smooth, mut all) = (0u64, 0u64);
+    let mut at = Vec::new();
     gathered.for_each_piece(MemoryPlan::PIECE, |start, gathered| {
         mesh.positions.read_vec(start, gathered.len(), &mut at)?;
-        let referenced = at.iter().zip(gathered).filter(|(_, gathered)| gathered.radius >= 0.0);
-        bounds = referenced.fold(bounds, |bounds, (position, _)| bounds.including(*position));
+        for (position, gathered) in at.iter().zip(gathered).filter(|(_, gathered)| gathered.radius >= 0.0) {
+            bounds = bounds.including(*position);
+            let [x, y, z] = gathered.normal.map(|sum| sum as f32);
+            smooth += u64::from(x * x + y * y + z * z >= SMOOTH * SMOOTH);
+            all += 1;
+        }
+        Ok(())
+    })?;
+    Ok(Survey { bounds, smooth_share: smooth as f64 / all.max(1) as f64 })
+}
+
+/// The normal of each vertex: its own where it has one, else what it gathered.
+fn orient(mesh: &Mesh, gathered: &Spool<Gathered>, plan: &MemoryPlan<'_>) -> io::Result<Spool<Aspect>> {
+    let mut aspects = Spool::new(&plan.place())?;
+    aspects.expect(gathered.len());
+    let has_own = mesh.normals.len() > 0;
+    let mut own = Vec::new();
+    gathered.for_each_piece(MemoryPlan::PIECE, |start, gathered| {
         if has_own {
             mesh.normals.read_vec(start, gathered.len(), &mut own)?;
         }
@@ -227,7 +362,7 @@ fn orient(mesh: &Mesh, gathered: &Spool<Gathered>, plan: &MemoryPlan<'_>) -> io:
         };
         aspects.push(&gathered.par_iter().with_min_len(1 << 12).enumerate().map(aspect).collect::<Vec<_>>())
     })?;
-    Ok((aspects, bounds))
+    Ok(aspects)
 }
 
 /// Second look at all triangles: how far their normals are from their vertices'.
@@ -263,19 +398,26 @@ fn widen_cones(
     })
 }
 
-/// Leaves of all referenced vertices, in their order; and whether they have colours.
+/// Leaves of all referenced vertices, in their order, after those of samples, if any.
 fn collect(
     mesh: Mesh,
     gathered: &Spool<Gathered>,
     aspects: &Spool<Aspect>,
+    samples: Option<Spool<Leaf>>,
     origin: DVec3,
     plan: &MemoryPlan<'_>,
     phases: &Phases<'_>,
-) -> io::Result<(Spool<Leaf>, bool)> {
-    let Mesh { positions, normals, colors, triangles } = mesh;
-    drop((normals, triangles));
+) -> io::Result<Spool<Leaf>> {
+    let Mesh { positions, normals, colors, triangles, paint } = mesh;
+    let is_painted = paint.is_some();
+    drop((normals, triangles, paint));
     let has_colors = colors.len() > 0;
-    let mut leaves = Spool::named(&plan.place(), "leaves")?;
+    let mut leaves = match samples {
+        // No triangle is left to vertices.
+        Some(leaves) if is_painted => return Ok(leaves),
+        Some(leaves) => leaves,
+        None => Spool::named(&plan.place(), LEAVES)?,
+    };
     leaves.expect(positions.len());
     let (mut at, mut aspect, mut color) = (Vec::new(), Vec::new(), Vec::new());
     gathered.for_each_piece(MemoryPlan::PIECE, |start, gathered| {
@@ -299,7 +441,7 @@ fn collect(
         phases.at(start + gathered.len() as u64);
         Ok(())
     })?;
-    Ok((leaves, has_colors))
+    Ok(leaves)
 }
 
 /// All triangles, as many at a time as the plan allows, in whole strides.

@@ -8,7 +8,8 @@
 //!          join       65,536     midpoint children               by size            the file
 //! ```
 //!
-//! A model without triangles is a point cloud: its leaves come from `points/`.
+//! A model without triangles is a point cloud: its leaves come from `points/`. Large triangles are cut into cells, each a leaf
+//! (`dice/`), and so are those whose colours are not their vertices' (`paint/`).
 //!
 //! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk. On
 //! disk, `checkpoint.rs` makes of the end of each step a place to continue from.
@@ -21,6 +22,7 @@ mod below;
 mod checkpoint;
 mod chunk;
 mod contract;
+mod dice;
 mod divide;
 mod facets;
 mod join;
@@ -32,6 +34,7 @@ mod measure;
 mod mesh;
 mod orientation;
 mod pages;
+mod paint;
 mod plan;
 mod points;
 mod quantise;
@@ -75,8 +78,11 @@ pub fn build(
         .map_err(|error| BuildError::Threads(error.to_string()))?;
 
     let up = options.up.unwrap_or(input.up_axis());
-    let influential =
+    let mut influential =
         BTreeMap::from([("as".into(), Kind::Splats.name().into()), ("up".into(), format!("{up:?}").to_lowercase())]);
+    if let Some(spacing) = options.spacing {
+        influential.insert("spacing".into(), spacing.to_string());
+    }
     let in_memory = plan::fits_into_memory(options, &*input);
     let work = match &options.input {
         Some(identity) => {
@@ -92,7 +98,7 @@ pub fn build(
         None => (Output::create(out), Place::Folder(folder_of(out))),
     };
     let output = output.map_err(BuildError::Output)?;
-    let plan = MemoryPlan::new(options, place);
+    let plan = MemoryPlan::new(options, place, folder_of(out));
 
     let mut input = Some(input);
     let (mut stage, resumed_after) = checkpoint::load(work.as_ref()).map_err(BuildError::Scratch)?;
@@ -118,9 +124,9 @@ pub fn build(
             }
             Stage::Read(mesh) => {
                 let counts = InputCounts { triangles: mesh.triangles.len(), vertices: mesh.positions.len(), points: 0 };
-                let leaves = workers.install(|| leaves::from_mesh(mesh, &plan, &phases))?;
-                let leaves::Leaves { leaves, origin, bounds, closed, has_colors } = leaves;
-                Stage::Leaves(Facts { counts, origin, bounds, closed, has_colors }, leaves)
+                let leaves = workers.install(|| leaves::from_mesh(mesh, options.spacing, &plan, &phases))?;
+                let leaves::Leaves { leaves, origin, bounds, closed, has_colors, dicing } = leaves;
+                Stage::Leaves(Facts { counts, origin, bounds, closed, has_colors, dicing }, leaves)
             }
             Stage::Leaves(facts, leaves) => {
                 Stage::Dividing(facts, Division::new(leaves, &plan).map_err(BuildError::Scratch)?)
@@ -140,7 +146,7 @@ pub fn build(
         }
     };
     drop(input);
-    let Facts { counts, origin, bounds, closed, has_colors } = facts;
+    let Facts { counts, origin, bounds, closed, has_colors, dicing } = facts;
     let quantised = workers.install(|| quantise::top_down(chunks, &plan, &phases)).map_err(BuildError::Scratch)?;
     let pages::Written { writer, pages, model, nodes, levels, raw_bytes } =
         workers.install(|| pages::write(&quantised, output.file(), &phases)).map_err(BuildError::Output)?;
@@ -160,6 +166,9 @@ pub fn build(
     if has_colors {
         attributes.push("colors".into());
     }
+    if let Some(dicing) = dicing {
+        influential.insert("spacing".into(), dicing.spacing.to_string());
+    }
     let skeleton = Skeleton::encode(&root, &pages, model.as_ref());
     let metadata = Metadata {
         generator: GENERATOR.into(),
@@ -172,6 +181,7 @@ pub fn build(
         closed,
         bounds: Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() },
         attributes,
+        dicing,
         per_level: levels,
     };
     let (buffer, output_bytes) = writer.finish(&skeleton, &metadata).map_err(BuildError::Output)?;

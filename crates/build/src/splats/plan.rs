@@ -7,6 +7,8 @@ use super::chunk::MAX_LEAVES;
 use crate::Options;
 use crate::spool::Place;
 use gigalod_import::ModelStream;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the spools take for each vertex and triangle, at the stage where they take most: position, normal, colour and gathered
 /// attributes; then leaf, kept nodes and packed nodes.
@@ -21,6 +23,9 @@ const SPOOLED_PER_POINT: u64 = SPOOLED_PER_VERTEX + 2 * SPOOLED_PER_TRIANGLE + 5
 /// and what it gives to its vertices; all but the positions twice, as the batch before is gathered meanwhile.
 const WORK_PER_TRIANGLE: u64 = 12 + 3 * 24 + 2 * (12 + 3 * 8 + 32 + 6);
 
+/// Bytes of work for each triangle that is diced: what its corners carry, twice while it is fetched, and its grid.
+const WORK_PER_DICED: u64 = 3 * 2 * (24 + 12 + 3 + 8 + 12) + 24 + 300;
+
 /// Bytes of work for each leaf of a block: the leaf, its kept nodes, and a share of the trees in work.
 const WORK_PER_LEAF: u64 = 160;
 
@@ -30,7 +35,12 @@ const WORK_PER_THREAD: u64 = 13 << 20;
 #[derive(Debug)]
 pub(super) struct MemoryPlan<'a> {
     budget: u64,
+    threads: usize,
     place: Place<'a>,
+    /// For what does not fit where the rest does.
+    folder: &'a Path,
+    /// What comes from now on does not fit.
+    is_spilled: AtomicBool,
 }
 
 /// Threads to work with: as many as are asked for, or one a core, but no more than memory has room for.
@@ -56,17 +66,54 @@ pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bo
 }
 
 impl<'a> MemoryPlan<'a> {
-    pub(super) fn new(options: &Options, place: Place<'a>) -> Self {
-        Self { budget: options.memory_bytes, place }
+    pub(super) fn new(options: &Options, place: Place<'a>, folder: &'a Path) -> Self {
+        let (budget, threads) = (options.memory_bytes, threads(options));
+        Self { budget, threads, place, folder, is_spilled: AtomicBool::new(false) }
     }
 
     pub(super) fn place(&self) -> Place<'a> {
-        self.place
+        if self.is_spilled.load(Ordering::Relaxed) { self.place_in_files() } else { self.place }
+    }
+
+    /// For what lies in files whatever room there is.
+    pub(super) fn place_in_files(&self) -> Place<'a> {
+        match self.place {
+            Place::Memory => Place::Folder(self.folder),
+            other => other,
+        }
     }
 
     /// True where all spools are in memory.
     pub(super) fn is_in_memory(&self) -> bool {
-        matches!(self.place, Place::Memory)
+        matches!(self.place(), Place::Memory)
+    }
+
+    /// So many leaves are to come, of which the input said nothing: from now on spools are in files, if there are too many.
+    /// `spooled` is what is in memory beside them.
+    pub(super) fn expect_leaves(&self, leaves: u64, spooled: u64) {
+        if leaves.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(spooled) > self.budget / 2 {
+            self.is_spilled.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Most bytes to decode a picture in.
+    pub(super) fn picture_bytes(&self) -> u64 {
+        self.budget / 2
+    }
+
+    /// Bytes for tiles of pictures.
+    pub(super) fn tile_bytes(&self) -> u64 {
+        self.budget / 16
+    }
+
+    /// Triangles to be diced at a time.
+    pub(super) fn diced_at_once(&self) -> usize {
+        ((self.budget / 8 / WORK_PER_DICED) as usize).clamp(256, 1 << 16)
+    }
+
+    /// Cells of them to be made into leaves at a time.
+    pub(super) fn cells_at_once(&self) -> usize {
+        self.threads << 14
     }
 
     /// Vertices that memory has room for.

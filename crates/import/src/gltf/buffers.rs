@@ -185,8 +185,9 @@ impl Buffers {
     pub(super) fn picture(&mut self, root: &json::Root, number: usize) -> Result<Vec<u8>, ImportError> {
         let image = root.images.get(number).ok_or_else(|| missing("image", number, root.images.len()))?;
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => data_uri(uri)
-                .map_err(|found| ImportError::malformed("data in base64", found, item("image", number))),
+            (Some(uri), _) => {
+                data_uri(uri).map_err(|found| ImportError::malformed("data in base64", found, item("image", number)))
+            }
             (None, Some(view)) => self.whole(root, view),
             (None, None) => Err(ImportError::malformed("a picture", "neither data nor a view", item("image", number))),
         }
