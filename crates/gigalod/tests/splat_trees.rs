@@ -69,7 +69,7 @@ fn builds_soundly(positions: &[[f64; 3]], triangles: &[[u32; 3]]) {
     assert_eq!(problems.told, Vec::<String>::new());
     let positions = positions.iter().map(|p| DVec3::from_array(*p)).collect();
     let mesh = Mesh::new(positions, None, None, triangles.to_vec()).unwrap();
-    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh, &|_| ());
+    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh, None, &|_| ());
     assert_eq!(measured.violations, 0, "{measured:?}");
     let mut referenced: Vec<u32> = triangles.as_flattened().to_vec();
     referenced.sort_unstable();
@@ -235,7 +235,7 @@ fn a_tree_of_several_chunks_is_sound() {
     let file = open(&out);
     let (tree, problems) = verify::check(&file, &mut |_| {});
     assert_eq!(problems.told, Vec::<String>::new());
-    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh, &|_| ());
+    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh, None, &|_| ());
     assert_eq!(measured.violations, 0, "{measured:?}");
 }
 
@@ -256,7 +256,7 @@ fn real_scan_builds_soundly(name: &str, most_bytes_per_leaf: f64) {
     let file = built(&path, folder.path());
     let (tree, problems) = verify::check(&file, &mut |_| {});
     assert_eq!(problems.told, Vec::<String>::new());
-    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh(&path), &|_| ());
+    let measured = verify::against(&tree, file.skeleton().root().origin, &mesh(&path), None, &|_| ());
     assert_eq!(measured.violations, 0, "{measured:?}");
     let metadata = file.container().read_metadata().unwrap();
     let per_leaf = metadata.raw_bytes as f64 / metadata.leaves as f64;

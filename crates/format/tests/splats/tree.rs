@@ -248,6 +248,7 @@ pub(crate) fn metadata(tree: &Tree) -> Metadata {
         closed: root.closed,
         bounds: Bounds { min: root.bounds.min.to_array(), max: root.bounds.max.to_array() },
         attributes: vec!["normals".into()],
+        dicing: None,
         per_level: Vec::new(),
     }
 }

@@ -73,6 +73,13 @@ pub(crate) struct BuildOptions {
     /// Worker threads [default: one for each core]
     #[arg(long, default_value = "0", hide_default_value = true, value_parser = parse::threads, value_name = "N")]
     pub(crate) threads: usize,
+    /// Sample triangles that are larger than this so finely, in the model's units [default: what suits the model]
+    ///
+    /// Of a scan, only what is out of all proportion is cut by default; of anything else, such as a building, so much that there
+    /// are about 2 million samples, or one a triangle if these are more. Smaller takes more time and room, and looks sharper
+    /// close up.
+    #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "UNITS")]
+    pub(crate) spacing: Option<f64>,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]

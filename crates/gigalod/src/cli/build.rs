@@ -54,10 +54,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         let what = if metadata.input.points > 0 {
             format!("only {} points; splats are made for dense scans", metadata.leaves)
         } else {
-            format!(
-                "only {} vertices; splats are made for dense scans, large triangles become large discs",
-                metadata.leaves
-            )
+            format!("only {} vertices; splats are made for dense scans", metadata.leaves)
         };
         console.warn(&CliError::in_file(input, what));
     }
@@ -75,8 +72,12 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         phases: report.phases.iter().map(|phase| PhaseReport { name: phase.name, seconds: phase.seconds }).collect(),
         resumed_after: report.resumed_after.as_deref(),
     };
+    let diced = match metadata.dicing {
+        Some(dicing) => format!(" (of {} diced triangles {})", dicing.triangles, dicing.samples),
+        None => String::new(),
+    };
     let text = format!(
-        "{}: {} as {} splats on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
+        "{}: {} as {} splats{diced} on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
         args.output.display(),
         match metadata.input {
             InputCounts { points, triangles: 0, .. } => format!("{points} points"),
@@ -127,6 +128,7 @@ pub(crate) fn build(
         memory_bytes: options.memory,
         threads: options.threads,
         up,
+        spacing: options.spacing,
         input: (recovery != Recovery::Lost).then_some(identity),
         resume: recovery == Recovery::Resume,
     };

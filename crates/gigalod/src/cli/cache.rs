@@ -15,7 +15,7 @@ pub(crate) fn container_of(file: &Path, options: &BuildOptions, console: &Consol
         return Ok(file.to_owned());
     }
     let folder = folder()?;
-    let name = format!("{}.glod", key(file, console)?);
+    let name = format!("{}.glod", key(file, options, console)?);
     let cached = folder.join(name);
     if cached.is_file() && files::open_splats(&cached).is_ok() {
         console.detail(|| format!("{}: built before as {}", file.display(), cached.display()));
@@ -37,8 +37,8 @@ fn folder() -> Result<PathBuf, CliError> {
     })
 }
 
-/// Depends on all bytes of the file and on the program's version; memory and threads do not change what is built.
-fn key(file: &Path, console: &Console) -> Result<String, CliError> {
+/// Depends on all bytes of the file, the spacing asked for and the program's version; memory and threads do not change what is built.
+fn key(file: &Path, options: &BuildOptions, console: &Console) -> Result<String, CliError> {
     let wrong = |error| CliError::in_file(file, error);
     let mut source = files::open(file)?;
     let total = source.metadata().map_err(wrong)?.len();
@@ -46,6 +46,9 @@ fn key(file: &Path, console: &Console) -> Result<String, CliError> {
     work.begin("read", total);
     let mut hasher = blake3::Hasher::new();
     hasher.update(concat!("gigalod ", env!("CARGO_PKG_VERSION"), " splats\n").as_bytes());
+    if let Some(spacing) = options.spacing {
+        hasher.update(format!("spacing {spacing}\n").as_bytes());
+    }
     let mut buffer = vec![0; 1 << 20];
     let mut done = 0;
     loop {

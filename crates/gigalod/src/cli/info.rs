@@ -5,7 +5,7 @@ use super::error::{CliError, Outcome};
 use super::files;
 use super::parse::readable_bytes;
 use super::progress::Console;
-use gigalod_format::{Bounds, InputCounts, LevelSummary};
+use gigalod_format::{Bounds, Dicing, InputCounts, LevelSummary};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -24,6 +24,7 @@ struct InfoReport<'a> {
     raw_bytes: u64,
     closed: bool,
     bounds: Bounds,
+    dicing: Option<Dicing>,
     attributes: &'a [String],
     per_level: &'a [LevelSummary],
 }
@@ -46,6 +47,7 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
         raw_bytes: metadata.raw_bytes,
         closed: metadata.closed,
         bounds: metadata.bounds,
+        dicing: metadata.dicing,
         attributes: &metadata.attributes,
         per_level: &metadata.per_level,
     };
@@ -64,6 +66,9 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
             InputCounts { triangles, vertices, .. } => format!("{triangles} triangles, {vertices} vertices"),
         },
     );
+    if let Some(Dicing { spacing, triangles, samples }) = metadata.dicing {
+        line("diced", format!("{triangles} triangles into {samples} samples, each for at most a square of {spacing}"));
+    }
     for (name, value) in &metadata.options {
         line("option", format!("{name} = {value}"));
     }

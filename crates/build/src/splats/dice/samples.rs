@@ -266,13 +266,16 @@ impl Dice<'_> {
                     corner: std::array::from_fn(|axis| (0..3).map(|k| coords[k][axis] * corner_weights[k]).sum()),
                     sides: [along[0].map(|grows| grows * sizes[0]), along[1].map(|grows| grows * sizes[1])],
                 };
-                // Beyond the triangle's edges, an atlas shows something else.
+                // Beyond the triangle's edges, an atlas shows something else. What a mask shows of it may as well be there.
                 let is_within = |by: [f64; 2]| {
+                    if coat.look.cutoff.is_some() {
+                        return true;
+                    }
                     let at = std::array::from_fn(|axis| cell.min[axis] + sizes[axis] * by[axis]);
                     grid.weights(at).iter().all(|weight| *weight >= 0.0)
                 };
                 let shown = coat.paint.shown(tiles, coat.look, &area, is_within)?;
-                if coat.look.cutoff.is_some_and(|cutoff| shown.alpha < f32::from(cutoff)) {
+                if coat.look.cutoff.is_some_and(|cutoff| shown.alpha < f32::from(cutoff) * 0.5) {
                     return Ok(None);
                 }
                 linear *= shown.color;
