@@ -26,7 +26,7 @@ fn build_and_info_report_exactly_the_keys_of_the_contract() {
     assert_eq!(
         shape(&ran.json()),
         format!(
-            "{{attributes[] bounds{{max[] min[]}} bytes closed {INPUT} kind leaves levels nodes options{{..}} \
+            "{{attributes[] bounds{{max[] min[]}} bytes closed dicing {INPUT} kind leaves levels nodes options{{..}} \
              per_level[{{bytes level max_error nodes points triangles}}] raw_bytes version}}"
         )
     );

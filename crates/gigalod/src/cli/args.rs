@@ -57,7 +57,7 @@ pub(crate) struct BuildArgs {
     /// Continue a build that was interrupted, if there is one
     ///
     /// A build that does not fit into half of --memory works in a folder beside the output, .NAME.glod.build, and can go on
-    /// there after anything: with the same input, --as and --up, or it is refused; --memory and --threads may differ. Without
+    /// there after anything: with the same input, --as, --up and --spacing, or it is refused; --memory and --threads may differ. Without
     /// --resume what is there is removed and the build starts anew. The folder takes up to three times the input's size.
     #[arg(long)]
     pub(crate) resume: bool,

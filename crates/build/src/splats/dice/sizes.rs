@@ -110,10 +110,10 @@ impl Sizes {
         self.classes().map(|(_, area, _)| area).sum()
     }
 
-    /// About as many cells as the triangles beyond a radius are cut into, at most: a square for each, and what rounding up to whole
+    /// About as many cells as the triangles beyond a radius are cut into: a square for each, and what rounding up to whole
     /// rows and strips costs, which goes with their size.
     fn cells(&self, spacing: f64, beyond: f64) -> f64 {
-        let of = |(radius, area, count): (f64, f64, f64)| area / spacing / spacing + 3.0 * radius * count / spacing;
+        let of = |(radius, area, count): (f64, f64, f64)| area / spacing / spacing + 1.5 * radius * count / spacing;
         self.classes().filter(|(radius, ..)| *radius > beyond).map(of).sum()
     }
 
