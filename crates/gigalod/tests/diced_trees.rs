@@ -291,7 +291,7 @@ fn bytes_do_not_depend_on_threads_memory_or_order() {
     let mut plain = town();
     (plain.corners, plain.materials, plain.tex_coords) = (vec![], vec![], vec![]);
     for (name, mut model) in [("painted", town()), ("plain", plain)] {
-        let mut bytes = |model: &Painted, threads: usize, memory_bytes: u64| {
+        let bytes = |model: &Painted, threads: usize, memory_bytes: u64| {
             build(model, &Options { threads, memory_bytes, ..spaced(0.11) }, &out).unwrap();
             std::fs::read(&out).unwrap()
         };

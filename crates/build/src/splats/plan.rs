@@ -15,6 +15,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const SPOOLED_PER_VERTEX: u64 = 24 + 12 + 3 + 16 + 4;
 const SPOOLED_PER_TRIANGLE: u64 = 12 + 6;
 
+/// What they take besides where materials have textures: texture coordinates, their numbers and a material's.
+const PAINT_PER_VERTEX: u64 = 8 + 8;
+const PAINT_PER_TRIANGLE: u64 = 12 + 4;
+
 /// What they take for each point of a cloud without faces. What is spooled first is less than of a mesh, which has two triangles
 /// a vertex; from the leaves on it is the same.
 const SPOOLED_PER_POINT: u64 = SPOOLED_PER_VERTEX + 2 * SPOOLED_PER_TRIANGLE + 5;
@@ -56,8 +60,10 @@ pub(super) fn threads(options: &Options) -> usize {
 pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bool {
     let spooled = match (input.declared_vertices(), input.declared_faces()) {
         (Some(vertices), Some(faces)) => {
-            let mesh =
-                vertices.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE));
+            let is_painted = input.materials().iter().any(|material| material.texture.is_some());
+            let paint = if is_painted { [PAINT_PER_VERTEX, PAINT_PER_TRIANGLE] } else { [0; 2] };
+            let of_vertices = vertices.saturating_mul(SPOOLED_PER_VERTEX + paint[0]);
+            let mesh = of_vertices.saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE + paint[1]));
             mesh.max(vertices.saturating_mul(SPOOLED_PER_POINT))
         }
         _ => u64::MAX,

@@ -12,7 +12,7 @@ use std::io::{self, Cursor};
 use std::path::Path;
 
 /// A model, whole.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Painted {
     pub(crate) positions: Vec<DVec3>,
     pub(crate) normals: Vec<Vec3>,
