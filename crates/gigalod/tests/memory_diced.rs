@@ -39,7 +39,11 @@ fn a_build_that_dices_allocates_no_more_than_its_budget() {
             });
             // The stream gives out copies of its files.
             let share = peak.saturating_sub(own as usize) as f64 / memory_bytes as f64;
-            println!("declared {is_declared}, painted {is_painted}, {} MiB, {threads} threads: {:.0} %", memory_bytes / MIB, share * 100.0);
+            println!(
+                "declared {is_declared}, painted {is_painted}, {} MiB, {threads} threads: {:.0} %",
+                memory_bytes / MIB,
+                share * 100.0
+            );
             assert!(share <= 1.0, "{peak} bytes allocated of {memory_bytes}, {threads} threads");
             fullest = fullest.max(share);
         };

@@ -248,19 +248,27 @@ fn textured_materials_come_with_texture_coordinates() {
 fn textures_say_how_they_are_mapped_and_their_pictures_can_be_had() {
     let mut gltf = square();
     let coords = gltf.floats(&[[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.25, 0.5]]);
-    let transform = json!({ "offset": [0.5, -1.0], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2.0, 4.0], "texCoord": 1 });
+    let transform =
+        json!({ "offset": [0.5, -1.0], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2.0, 4.0], "texCoord": 1 });
     let used = json!({ "index": 0, "extensions": { "KHR_texture_transform": transform } });
     let factor = json!([1.0, 1.0, 1.0, 0.5]);
     gltf.push("materials", json!({
         "pbrMetallicRoughness": { "baseColorTexture": used, "baseColorFactor": factor }, "alphaMode": "MASK", "alphaCutoff": 0.2
     }));
-    gltf.push("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } }, "alphaMode": "BLEND" }));
-    gltf.push("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 } }, "alphaMode": "MASK" }));
+    gltf.push(
+        "materials",
+        json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } }, "alphaMode": "BLEND" }),
+    );
+    gltf.push(
+        "materials",
+        json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 } }, "alphaMode": "MASK" }),
+    );
     gltf.push("materials", json!({}));
     gltf.json["textures"] = json!([{ "source": 0, "sampler": 0 }, { "source": 1, "sampler": 9 }, { "source": 2 }]);
     gltf.json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648 }]);
     let inside = base64(b"in the text");
-    gltf.json["images"] = json!([{ "bufferView": 0 }, { "uri": "a%20wall.jpg" }, { "uri": format!("data:image/png;base64,{inside}") }]);
+    gltf.json["images"] =
+        json!([{ "bufferView": 0 }, { "uri": "a%20wall.jpg" }, { "uri": format!("data:image/png;base64,{inside}") }]);
     gltf.json["extensionsRequired"] = json!(["KHR_texture_transform"]);
     let primitive = &mut gltf.json["meshes"][0]["primitives"][0];
     primitive["attributes"]["TEXCOORD_1"] = coords.into();
@@ -283,7 +291,9 @@ fn textures_say_how_they_are_mapped_and_their_pictures_can_be_had() {
     assert_eq!(cutoffs, [Some(102), None, Some(127), None]);
     let mut picture = |material: u32| {
         let mut bytes = Vec::new();
-        stream.open_picture(material).map(|mut source| source.read_to_end(&mut bytes).map(|_| bytes).expect("it is there"))
+        stream
+            .open_picture(material)
+            .map(|mut source| source.read_to_end(&mut bytes).map(|_| bytes).expect("it is there"))
     };
     assert_eq!(picture(0).expect("it is in the buffer")[..4], gltf.bytes[..4]);
     assert_eq!(picture(1).expect("it is beside"), b"beside");
