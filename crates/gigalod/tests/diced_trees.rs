@@ -325,7 +325,7 @@ fn a_picture_that_is_missing_or_damaged_leaves_the_materials_colour_and_is_noted
     let picture = waves(&mut model, 64);
     model.looks[picture as usize].color = [200, 40, 40];
     model.wall(DVec3::ZERO, [DVec3::X, DVec3::Y], picture);
-    let whole = model.pictures[0].clone();
+    let whole = model.pictures[0].to_vec();
     assert_eq!(build(&model, &spaced(0.1), &out).unwrap(), Vec::<String>::new());
     let mut odd = vec![vec![], b"no picture".to_vec(), whole[..40].to_vec(), whole[..whole.len() / 2].to_vec()];
     let mut flipped = whole.clone();
@@ -336,7 +336,7 @@ fn a_picture_that_is_missing_or_damaged_leaves_the_materials_colour_and_is_noted
     huge[16..24].fill(0x7f);
     odd.push(huge);
     for file in odd {
-        model.pictures[0] = file;
+        model.pictures[0] = file.into();
         let notes = build(&model, &spaced(0.1), &out).unwrap();
         assert!(notes.len() == 1 && notes[0].starts_with("picture 0: "), "{notes:?}");
         assert!(notes[0].ends_with("; its material's colour is shown instead"), "{notes:?}");

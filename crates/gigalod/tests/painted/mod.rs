@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 use std::fs::File;
 use std::io::{self, Cursor};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A model, whole.
 #[derive(Clone, Debug, Default)]
@@ -24,7 +25,7 @@ pub(crate) struct Painted {
     pub(crate) materials: Vec<u32>,
     pub(crate) looks: Vec<Material>,
     /// Files of embedded pictures.
-    pub(crate) pictures: Vec<Vec<u8>>,
+    pub(crate) pictures: Vec<Arc<[u8]>>,
     /// Says how much there is before it comes.
     pub(crate) is_declared: bool,
     pub(crate) sent: usize,
@@ -50,7 +51,7 @@ impl Painted {
         let mut file = Cursor::new(Vec::new());
         picture.write_to(&mut file, image::ImageFormat::Png).unwrap();
         let texture = Some(Texture::Embedded(self.pictures.len() as u32));
-        self.pictures.push(file.into_inner());
+        self.pictures.push(file.into_inner().into());
         self.looks.push(Material { texture, ..Material::plain(String::new()) });
         self.looks.len() as u32 - 1
     }
@@ -146,6 +147,39 @@ impl ModelStream for Painted {
 
     fn bytes_consumed(&self) -> (u64, u64) {
         (0, 0)
+    }
+}
+
+/// A model that stays when a build is done with it: what a build allocates is then counted from the same base all the way.
+pub(crate) struct Lent(pub(crate) &'static mut Painted);
+
+impl ModelStream for Lent {
+    fn attributes(&self) -> Attributes {
+        self.0.attributes()
+    }
+
+    fn materials(&self) -> &[Material] {
+        self.0.materials()
+    }
+
+    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
+        self.0.open_picture(material)
+    }
+
+    fn declared_vertices(&self) -> Option<u64> {
+        self.0.declared_vertices()
+    }
+
+    fn declared_faces(&self) -> Option<u64> {
+        self.0.declared_faces()
+    }
+
+    fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
+        self.0.next(batch)
+    }
+
+    fn bytes_consumed(&self) -> (u64, u64) {
+        self.0.bytes_consumed()
     }
 }
 
