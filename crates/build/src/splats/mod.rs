@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! mesh ──▶ leaves ──▶ divide ──▶ chunk: tree, contract, kept ──▶ quantise: lower ──▶ layout ──▶ pages
-//! stream   facets,    chunks of  binary,  2–4       measured     codes, top-down;    order of   coded
+//! stream   gather,    chunks of  binary,  2–4       measured     codes, top-down;    order of   coded
 //!          join       65,536     midpoint children               by size            the file
 //! ```
 //!
@@ -25,6 +25,7 @@ mod contract;
 mod dice;
 mod divide;
 mod facets;
+mod gather;
 mod join;
 mod kept;
 mod layout;

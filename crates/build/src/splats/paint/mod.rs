@@ -18,9 +18,12 @@ pub(super) use pictures::Picture;
 pub(super) use reading::Reading;
 pub(super) use texels::{Area, Tiles};
 
+use super::join::Corners;
+use super::plan::MemoryPlan;
 use crate::spool::Spool;
 use gigalod_import::{CornerBatch, Material, Wrap};
 use serde::{Deserialize, Serialize};
+use std::io;
 
 /// What triangles show.
 pub(super) struct Paint {
@@ -101,6 +104,32 @@ impl Look {
         let [u, v] =
             std::array::from_fn(|axis| coord[axis] * f64::from(self.scale[axis]) + f64::from(self.offset[axis]));
         [u * f64::from(size[0]), (1.0 - v) * f64::from(size[1])]
+    }
+}
+
+impl Paint {
+    /// Texels that triangles show, each as often as it is shown.
+    pub(super) fn count_texels(&self, plan: &MemoryPlan<'_>) -> io::Result<u64> {
+        let (mut looks, mut coords, mut texels) = (Vec::new(), Vec::new(), 0u64);
+        if self.tex_coords.len() == 0 {
+            return Ok(0);
+        }
+        self.corners.for_each_piece(plan.diced_at_once(), |start, corners| {
+            self.materials.read_vec(start, corners.len(), &mut looks)?;
+            let known = corners.as_flattened().iter().map(|number| if *number == NONE { 0 } else { *number });
+            Corners::of_vertices(known.collect()).fetch(&self.tex_coords, &mut coords)?;
+            for ((coords, look), numbers) in coords.as_chunks::<3>().0.iter().zip(&looks).zip(corners) {
+                let Some(look) = self.looks.get(*look as usize) else { continue };
+                let Some(picture) = look.picture.filter(|_| !numbers.contains(&NONE)) else { continue };
+                let size = self.pictures[picture as usize].levels[0].size;
+                let [[ax, ay], [bx, by], [cx, cy]] = coords.map(|coord| look.texel(coord.map(f64::from), size));
+                let area = ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)).abs() * 0.5;
+                // In whole numbers, so that their order does not show; casting saturates.
+                texels = texels.saturating_add(area as u64);
+            }
+            Ok(())
+        })?;
+        Ok(texels)
     }
 }
 
