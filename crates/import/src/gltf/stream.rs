@@ -11,6 +11,7 @@ use super::{
     scene::{self, Draw, Part, Topology},
 };
 use crate::{Attributes, Batch, CornerBatch, ImportError, Material, ModelStream, error::Problem};
+use gigalod_geom::LengthUnit;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::{HashMap, hash_map::Entry};
 use std::ops::Range;
@@ -385,6 +386,10 @@ impl Rows {
 impl ModelStream for GltfStream {
     fn attributes(&self) -> Attributes {
         self.attributes
+    }
+
+    fn unit(&self) -> Option<LengthUnit> {
+        Some(LengthUnit::Metre)
     }
 
     fn materials(&self) -> &[Material] {

@@ -9,14 +9,19 @@
 //!   where none of those points has a channel above 255, they are taken for 8 bits, as many programs write them.
 //! * **Counts**: the header's is believed one point at a time. Before LAS 1.4 it has 32 bits. A stream has fewer than 2³²
 //!   points, since that is how vertices are numbered.
-//! * **Everything else** (intensity, classes, times, waveforms, projections) is skipped.
+//! * **What coordinates mean**: the name, number and text of the system of coordinates and the horizontal unit of lengths, from
+//!   the records of WKT or GeoTIFF, which must not lie to be useful and do no harm where they do.
+//! * **Everything else** (intensity, classes, times, waveforms) is skipped.
 //! * LAZ is not read from gzip.
 
 mod header;
 mod laz;
+mod records;
+mod source;
 
 use self::laz::LazRecords;
-use crate::{Attributes, Batch, ImportError, ModelStream, Place, error::Problem, input::Input};
+use crate::{Attributes, Batch, ImportError, ModelStream, Place, ReferenceSystem, error::Problem, input::Input};
+use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use glam::DVec3;
 use header::Header;
@@ -36,11 +41,11 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError
     let header = header::read(&mut input)?;
     let total_bytes = input.progress().1;
     let most = (total_bytes * MOST_POINTS_PER_BYTE).max(Batch::TARGET as u64);
-    if header.laz.is_some() && header.point_count > most {
+    if header.records.laz.is_some() && header.point_count > most {
         let expected = format!("at most {most} points in a LAZ file of {total_bytes} bytes");
         return Err(ImportError::malformed(expected, header.point_count.to_string(), Place::byte(247)));
     }
-    let records = match &header.laz {
+    let records = match &header.records.laz {
         None => {
             let before = header.points_offset - input.offset();
             if !input.skip(before)? {
@@ -140,6 +145,14 @@ impl ModelStream for LasStream {
 
     fn up_axis(&self) -> UpAxis {
         UpAxis::Z
+    }
+
+    fn unit(&self) -> Option<LengthUnit> {
+        self.header.records.unit
+    }
+
+    fn reference_system(&self) -> Option<&ReferenceSystem> {
+        self.header.records.system.as_ref()
     }
 
     fn declared_vertices(&self) -> Option<u64> {
