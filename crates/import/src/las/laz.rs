@@ -7,11 +7,12 @@
 //! allocated: memory is that of a chunk.
 
 use super::header::Header;
+use super::source::Source;
 use crate::{ByteSource, ImportError, Place, error::Problem};
 use laz::laszip::ChunkTable;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
 use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
-use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 /// Largest chunk of layers, packed. Usual ones have a few hundred kilobytes.
 const MOST_CHUNK_BYTES: u64 = 256 << 20;
@@ -19,8 +20,6 @@ const MOST_CHUNK_BYTES: u64 = 256 << 20;
 const MOST_EXTRA_BYTES: u16 = 1024;
 /// Most chunks in a table that must be read.
 const MOST_CHUNKS: u32 = 1 << 22;
-
-type Source = BufReader<Box<dyn ByteSource>>;
 
 pub(super) struct LazRecords {
     unpacker: Unpacker,
@@ -80,7 +79,7 @@ impl LazRecords {
         let place = Place::byte(header.points_offset);
         let failed = |source: io::Error| ImportError::new(Problem::Io { source }, Some(place.clone()));
         let end = source.seek(SeekFrom::End(0)).map_err(failed)?;
-        let mut source = BufReader::with_capacity(64 << 10, source);
+        let mut source = Source::new(source).map_err(failed)?;
         source.seek(SeekFrom::Start(header.points_offset)).map_err(failed)?;
         let cannot =
             |error: laz::LasZipError| ImportError::malformed("LAZ of a known kind", error.to_string(), place.clone());
