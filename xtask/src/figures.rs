@@ -22,6 +22,13 @@ pub(crate) fn at_most(figure: String, measured: f64, target: f64, unit: &str) ->
     Row { figure, target: format!("≤ {target}"), measured: measured_text, met: Some(measured <= target) }
 }
 
+/// A figure that is not there met nothing, and missed nothing.
+pub(crate) fn within(figure: String, measured: Option<f64>, [low, high]: [f64; 2], unit: &str) -> Row {
+    let target = format!("{low}–{high}");
+    let Some(measured) = measured else { return Row { figure, target, measured: "–".into(), met: None } };
+    Row { figure, target, measured: format!("{measured:.1} {unit}"), met: Some((low..=high).contains(&measured)) }
+}
+
 pub(crate) fn plain(figure: String, measured: String) -> Row {
     Row { figure, target: String::new(), measured, met: None }
 }

@@ -1,0 +1,119 @@
+//! Drawing: selection, rasterising, frame times under control, and how much each kernel shimmers.
+
+use super::{Bench, Scope, data};
+use crate::figures::{Row, at_least, at_most, plain, within};
+use crate::program::number;
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+/// What a frame shall take.
+const TARGET_MS: &str = "100";
+
+pub(super) fn rows(bench: &Bench, scope: Scope<'_>, rows: &mut Vec<Row>) -> Result<()> {
+    let models = models(bench, scope)?;
+    for (name, file) in &models {
+        selection(bench, name, file, rows)?;
+    }
+    for (name, file) in &models {
+        rasterising(bench, name, file, rows)?;
+    }
+    for (name, file) in &models {
+        frame_rate(bench, name, file, rows)?;
+    }
+    shimmer(bench, rows)
+}
+
+/// Names of models and of their files, built.
+fn models(bench: &Bench, scope: Scope<'_>) -> Result<Vec<(&'static str, &'static str)>> {
+    let mut models = vec![("statue, 7 M", "statue7.glod", bench.statue7()?.to_owned())];
+    let dragons = bench.dragons("dragons10.ply", "10M")?;
+    models.extend(dragons.map(|model| ("dragon, replicated, 10 M", "dragons10.glod", model.to_owned())));
+    let lion = data("points/lion_takanawa_normals.ply");
+    models.extend(lion.map(|path| ("lion, points", "lion.glod", path.to_string_lossy().into_owned())));
+    if scope.large {
+        models.push(("statue, 100 M", "statue100.glod", bench.statue100()?.to_owned()));
+    }
+    for (_, file, model) in &models {
+        // Anew, since the format may have changed.
+        bench.0.gigalod(&["build", model, "-o", file])?;
+    }
+    Ok(models.into_iter().map(|(name, file, _)| (name, file)).collect())
+}
+
+/// Warm cuts.
+fn selection(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Result<()> {
+    let report = bench.example("gigalod-runtime", "select_speed", &[file, "1"])?;
+    let cuts = report["cuts"].as_array().context("cuts")?;
+    for threads in [1.0, 2.0] {
+        let on = || cuts.iter().filter(|cut| number(cut, "threads") == threads);
+        let rates = on().map(|cut| number(cut, "m_nodes_per_cpu_s"));
+        let (slowest, fastest) = rates.fold((f64::INFINITY, 0.0), |(low, high), r| (r.min(low), f64::max(r, high)));
+        let figure = format!("selection, {name}, {threads} threads: slowest of {} views", on().count());
+        let unit = format!("M nodes a CPU-second (fastest {fastest:.0})");
+        rows.push(at_least(figure, slowest, 30.0, &unit));
+        let whole = on().find(|cut| cut["pose"] == "default" && number(cut, "threshold_px") == 1.0).context("view")?;
+        rows.push(plain(
+            format!("a cut of the whole at 1 px, {name}, {threads} threads"),
+            format!("{:.1} ms for {:.2} M nodes", number(whole, "ms"), number(whole, "visited") / 1e6),
+        ));
+    }
+    let allocations = cuts.iter().map(|cut| number(cut, "allocations")).fold(0.0, f64::max);
+    rows.push(at_most(format!("allocations of a warm cut, {name}"), allocations, 0.0, ""));
+    Ok(())
+}
+
+/// Splats through the compute passes and through the pipeline.
+fn rasterising(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Result<()> {
+    for threshold_px in ["1", "0.5"] {
+        let arguments = [file, "--error", threshold_px, "--ways", "compute,quads"];
+        let report = bench.example("gigalod", "render_speed", &arguments)?;
+        let rate = |way: &str| number(&report["ways"][way], "points_per_cpu_second_without_upload") / 1e6;
+        let (compute, quads) = (rate("compute"), rate("quads"));
+        let points = number(&report, "points") / 1e6;
+        let figure = format!("{points:.2} M points drawn at {threshold_px} px, {name}");
+        rows.push(at_least(figure.clone(), compute, 20.0, "M points a CPU-second"));
+        rows.push(at_least(format!("{figure}: compute to pipeline"), compute / quads, 4.0, "times"));
+    }
+    Ok(())
+}
+
+/// Frames of a path that is played in real time.
+fn frame_rate(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Result<()> {
+    for path in ["walk", "sudden-turn"] {
+        bench.0.gigalod(&["synth", "path", path, "--around", file, "-o", "path.json"])?;
+        let report = bench.0.gigalod(&["bench", file, "--path", "path.json", "--target-ms", TARGET_MS])?;
+        let (paced, rest) = (&report["summary"]["paced"], &report["summary"]["rest"]);
+        for (what, key) in [("median", "frame_ms_median"), ("95th percentile", "frame_ms_p95")] {
+            let figure = format!("--target-ms {TARGET_MS}, {path}, {name}: {what} of {} frames", paced["frames"]);
+            rows.push(within(figure, paced[key].as_f64(), [80.0, 120.0], "ms"));
+        }
+        let turns = number(rest, "sign_changes") / number(rest, "seconds").max(1.0);
+        rows.push(at_most(format!("at rest, {path}, {name}: turns of the threshold"), turns, 2.0, "a second"));
+        let reached = format!("{} px", number(rest, "threshold_px"));
+        rows.push(at_most(format!("at rest, {path}, {name}: threshold"), number(rest, "threshold_px"), 1.0, "px"));
+        rows.push(plain(
+            format!("at rest, {path}, {name}: {reached} after"),
+            format!("{:.1} s", number(rest, "seconds")),
+        ));
+    }
+    Ok(())
+}
+
+/// A slow dolly, beside 16 rays a pixel.
+fn shimmer(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
+    for (name, model) in [("dragon", "scans/dragon_vrip.ply.gz"), ("bunny", "scans/bun_zipper.ply")] {
+        let Some(path) = data(model) else { continue };
+        let report = bench.example("gigalod", "shimmer", &[&path.to_string_lossy()])?;
+        let kernels = report["kernels"].as_object().context("kernels")?;
+        for (kernel, figures) in kernels {
+            rows.push(plain(format!("shimmer, {name}, {kernel}"), of_kernel(figures)));
+        }
+    }
+    Ok(())
+}
+
+fn of_kernel(figures: &Value) -> String {
+    let holes = figures["holes"].as_u64().map_or(String::new(), |holes| format!(", {holes} holes"));
+    let [shimmer, sharpness] = ["shimmer", "sharpness"].map(|key| number(figures, key));
+    format!("{shimmer:.2} of the reference's, sharpness {sharpness:.2}{holes}")
+}
