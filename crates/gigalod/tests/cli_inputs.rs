@@ -79,7 +79,8 @@ fn what_does_not_make_one_model_is_refused_by_name() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path();
     let out = folder.join("a.glod");
-    let (mesh, cloud) = (write(folder, "mesh.obj", obj(9, 0.0)), write(folder, "cloud.xyz", xyz(9, [0.0; 3])));
+    let mesh = write(folder, "mesh.obj", obj(9, 0.0));
+    let cloud = write(folder, "points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     let cut = write(folder, "cut.obj", "v 0 0 0\nv 1 0 0\nf 1 2 7\n");
     let refused = |inputs: &[&Path], file: &Path| {
         let mut build = cli_support::command();
