@@ -193,7 +193,21 @@ fn claims_allocate_next_to_nothing() {
     // The sizes of the layers of the first chunk, after the first point and the number of points.
     let start = u32::from_le_bytes(*laz[96..].first_chunk().expect("it is long")) as usize + 8 + 30 + 4;
     laz[start..start + 36].fill(0x7f);
+    // Where the points of a scan begin.
+    let mut e57 = make::e57(300);
+    e57[48 + 16..48 + 24].fill(255);
+    let e57 = fuzzing::e57_mended(&e57);
+    // A code that no packer writes: behind the first point, and behind the sizes of the layers.
+    let mut code = make::las(1, 0, 300, Some(100));
+    let start = u32::from_le_bytes(*code[96..].first_chunk().expect("it is long")) as usize + 8;
+    code[start + 28..start + 32].fill(255);
+    let mut layer = make::las(6, 0, 300, Some(100));
+    let start = u32::from_le_bytes(*layer[96..].first_chunk().expect("it is long")) as usize + 8 + 30;
+    layer[start + 40..start + 44].fill(255);
     let files = [
+        ("E57", e57),
+        ("LAZ", code),
+        ("LAZ", layer),
         ("OFF", b"OFF\n4000000000 4000000000 0\n0 0 0\n".to_vec()),
         ("OFF", b"OFF\n1 1 0\n0 0 0\n4000000000 0 0 0 0\n".to_vec()),
         ("PCD", format!("{pcd}binary\n1234").into_bytes()),

@@ -6,6 +6,7 @@
 //! chunks of varying size; everything else is found on the way. Sizes are checked against the file before anything is
 //! allocated: memory is that of a chunk.
 
+use super::gps::GpsTimes;
 use super::header::Header;
 use super::source::Source;
 use crate::{ByteSource, ImportError, Place, error::Problem};
@@ -158,8 +159,17 @@ impl LazRecords {
         };
         let count = match unpacker {
             Unpacker::PointWise { records, table } => {
+                let code = records.get_mut().ahead(self.record_bytes);
+                if let Err(error) = code.and_then(|code| code.map_or(Ok(()), check_code)) {
+                    return Err(self.failed(error, number));
+                }
                 records.reset();
-                records.set_fields_from(&items).map_err(cannot)?;
+                for item in items {
+                    match (item.item_type(), item.version()) {
+                        (LazItemType::GpsTime, 2) => records.add_field_decompressor(GpsTimes::default()),
+                        _ => records.set_fields_from(&vec![item]).map_err(cannot)?,
+                    }
+                }
                 match (is_point_wise_in_one(vlr)?, table) {
                     (true, _) => u64::MAX,
                     (_, Some(table)) => table.as_ref().get(self.chunk).map_or(0, |entry| entry.point_count),
@@ -210,7 +220,7 @@ fn read_layers(source: &mut Source, record_bytes: usize, layers: usize, left: u6
     let (words, _) = bytes[record_bytes..].as_chunks::<4>();
     let mut words = words.iter().map(|word| u64::from(u32::from_le_bytes(*word)));
     let count = words.next().unwrap_or_default();
-    let layer_bytes: u64 = words.sum();
+    let layer_bytes: u64 = words.clone().sum();
     if layer_bytes > left.saturating_sub(head_bytes as u64) {
         return Err(io::ErrorKind::UnexpectedEof.into());
     }
@@ -218,9 +228,25 @@ fn read_layers(source: &mut Source, record_bytes: usize, layers: usize, left: u6
         let message = format!("a chunk of {layer_bytes} bytes, more than {MOST_CHUNK_BYTES}");
         return Err(io::Error::new(io::ErrorKind::InvalidData, message));
     }
+    let sizes: Vec<usize> = words.map(|size| size as usize).collect();
     bytes.resize(head_bytes + layer_bytes as usize, 0);
     source.read_exact(&mut bytes[head_bytes..])?;
+    let mut rest = &bytes[head_bytes..];
+    for size in sizes {
+        let (layer, after) = rest.split_at(size);
+        layer.first_chunk().map_or(Ok(()), |code| check_code(*code))?;
+        rest = after;
+    }
     Ok((bytes, count))
+}
+
+/// Looks at the first bytes of an arithmetic code: it is a number below one. The unpacker relies on that, and never finds back
+/// from a code that is not.
+fn check_code(first: [u8; 4]) -> io::Result<()> {
+    match first {
+        [255, 255, 255, 255] => Err(io::Error::new(io::ErrorKind::InvalidData, "a code that nothing is packed to")),
+        _ => Ok(()),
+    }
 }
 
 /// Looks at the number of chunks that a table declares, before it is read.

@@ -14,6 +14,7 @@
 //! * **Everything else** (intensity, classes, times, waveforms) is skipped.
 //! * LAZ is not read from gzip.
 
+mod gps;
 mod header;
 mod laz;
 mod records;
@@ -28,6 +29,8 @@ use header::Header;
 
 /// Most bytes of records in memory: fewer points make a batch where each has thousands of extra bytes.
 const MOST_PIECE_BYTES: usize = 8 << 20;
+/// Points that are read at a time after the first batch, few enough to stay in the cache until they are converted.
+const RUN: usize = 4096;
 /// Most points for each byte of a LAZ file. Real ones have one or less; packed nothings could go on for ever.
 const MOST_POINTS_PER_BYTE: u64 = 64;
 
@@ -60,7 +63,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError
     };
     let mut stream =
         LasStream { header, records, read: 0, piece: Vec::new(), colors: None, total_bytes, is_first: true };
-    stream.fill()?;
+    stream.fill(Batch::TARGET)?;
     stream.decide_colors();
     Ok(Box::new(stream))
 }
@@ -91,10 +94,10 @@ struct Colors {
 }
 
 impl LasStream {
-    /// Reads the records of the next batch.
-    fn fill(&mut self) -> Result<(), ImportError> {
+    /// Reads the next records, so many at most.
+    fn fill(&mut self, most: usize) -> Result<(), ImportError> {
         let Self { header, records, piece, .. } = self;
-        let most = Batch::TARGET.min(MOST_PIECE_BYTES / header.record_bytes) as u64;
+        let most = most.min(MOST_PIECE_BYTES / header.record_bytes) as u64;
         let count = (header.point_count - self.read).min(most) as usize;
         let bytes = count * header.record_bytes;
         match records {
@@ -134,6 +137,37 @@ impl LasStream {
     }
 }
 
+impl LasStream {
+    /// Appends the points of the piece.
+    fn convert(&self, batch: &mut Batch) -> Result<(), ImportError> {
+        let Self { header, piece, .. } = self;
+        let positions = &mut batch.vertices.positions;
+        let before = positions.len();
+        positions.extend(piece.chunks_exact(header.record_bytes).map(|record| {
+            let axis = |axis: usize| {
+                let bytes = *record[4 * axis..].first_chunk().expect("a record has three integers");
+                f64::from(i32::from_le_bytes(bytes)) * header.scale[axis] + header.offset[axis]
+            };
+            DVec3::new(axis(0), axis(1), axis(2))
+        }));
+        let positions = &positions[before..];
+        if let Some(number) = positions.iter().position(|position| !position.is_finite()) {
+            let position = positions[number].to_array();
+            let first = self.read - positions.len() as u64;
+            let place = Place::byte(header.points_offset).of_item("point", first + number as u64);
+            return Err(ImportError::new(Problem::NotFinite { position }, Some(place)));
+        }
+        if let Some(Colors { offset, is_eight_bit }) = self.colors {
+            let shift = if is_eight_bit { 0 } else { 8 };
+            batch.vertices.colors.extend(piece.chunks_exact(header.record_bytes).map(|record| {
+                // Exact where a byte was written twice, or in the upper half.
+                color16(&record[offset..]).map(|channel| (channel >> shift).min(255) as u8)
+            }));
+        }
+        Ok(())
+    }
+}
+
 fn color16(bytes: &[u8]) -> [u16; 3] {
     std::array::from_fn(|channel| u16::from_le_bytes([bytes[2 * channel], bytes[2 * channel + 1]]))
 }
@@ -165,32 +199,17 @@ impl ModelStream for LasStream {
 
     fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
         batch.clear();
-        if !std::mem::take(&mut self.is_first) {
-            self.fill()?;
+        while !batch.is_full() {
+            let is_first = std::mem::take(&mut self.is_first);
+            if !is_first {
+                self.fill(RUN.min(Batch::TARGET - batch.vertices.positions.len()))?;
+            }
+            self.convert(batch)?;
+            if is_first || self.piece.is_empty() {
+                break;
+            }
         }
-        let Self { header, piece, .. } = self;
-        let positions = &mut batch.vertices.positions;
-        for record in piece.chunks_exact(header.record_bytes) {
-            let axis = |axis: usize| {
-                let bytes = *record[4 * axis..].first_chunk().expect("a record has three integers");
-                f64::from(i32::from_le_bytes(bytes)) * header.scale[axis] + header.offset[axis]
-            };
-            positions.push(DVec3::new(axis(0), axis(1), axis(2)));
-        }
-        if let Some(number) = positions.iter().position(|position| !position.is_finite()) {
-            let position = positions[number].to_array();
-            let first = self.read - positions.len() as u64;
-            let place = Place::byte(header.points_offset).of_item("point", first + number as u64);
-            return Err(ImportError::new(Problem::NotFinite { position }, Some(place)));
-        }
-        if let Some(Colors { offset, is_eight_bit }) = self.colors {
-            let shift = if is_eight_bit { 0 } else { 8 };
-            batch.vertices.colors.extend(piece.chunks_exact(header.record_bytes).map(|record| {
-                // Exact where a byte was written twice, or in the upper half.
-                color16(&record[offset..]).map(|channel| (channel >> shift).min(255) as u8)
-            }));
-        }
-        let more = !piece.is_empty();
+        let more = !batch.is_empty();
         if !more && let Records::Plain(input) = &mut self.records {
             input.finish()?;
         }

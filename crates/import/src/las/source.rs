@@ -30,6 +30,23 @@ impl Source {
         self.offset - (self.end - self.start) as u64
     }
 
+    /// Four bytes that come after the next `skipped`; none where the file ends before.
+    pub(super) fn ahead(&mut self, skipped: usize) -> io::Result<Option<[u8; 4]>> {
+        if let Some(bytes) = self.buffer[self.start..self.end].get(skipped..).and_then(|rest| rest.first_chunk()) {
+            return Ok(Some(*bytes));
+        }
+        let here = self.position();
+        self.seek(SeekFrom::Start(here.saturating_add(skipped as u64)))?;
+        let mut bytes = [0; 4];
+        let found = match self.read_exact(&mut bytes) {
+            Ok(()) => Some(bytes),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => None,
+            Err(error) => return Err(error),
+        };
+        self.seek(SeekFrom::Start(here))?;
+        Ok(found)
+    }
+
     #[cold]
     #[inline(never)]
     fn refill(&mut self, into: &mut [u8]) -> io::Result<()> {
@@ -106,6 +123,10 @@ mod tests {
             let random = (state >> 33) as usize;
             let mut into = vec![0; [1, 1, 1, 4, 100, BUFFER_BYTES + 5][random % 6]];
             let mut expected = into.clone();
+            let at = plain.position() as usize;
+            let skipped = random % 70_000;
+            let four = bytes.get(at + skipped..).and_then(|rest| rest.first_chunk()).copied();
+            assert_eq!(source.ahead(skipped).unwrap(), four);
             let outcome = source.read_exact(&mut into).map_err(|error| error.kind());
             assert_eq!(outcome, plain.read_exact(&mut expected).map_err(|error| error.kind()));
             if outcome.is_err() || step % 100 == 99 {

@@ -87,12 +87,16 @@ pub(crate) fn las(bytes: &[u8]) -> bool {
 
 /// With the checksums of its pages right.
 pub(crate) fn e57(bytes: &[u8]) -> bool {
+    any(&e57_mended(bytes))
+}
+
+pub(crate) fn e57_mended(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = [b"ASTM-E57", bytes.get(8..).unwrap_or_default()].concat();
     for page in bytes.chunks_exact_mut(1024) {
         let (content, sum) = page.split_at_mut(1020);
         sum.copy_from_slice(&crc32c::crc32c(content).to_be_bytes());
     }
-    any(&bytes)
+    bytes
 }
 
 pub(crate) fn pcd(bytes: &[u8]) -> bool {
