@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn bytes_come_as_from_the_file_however_they_are_asked_for() {
-        let bytes: Vec<u8> = (0..3 * BUFFER_BYTES + 17).map(|at| (at * at >> 7) as u8).collect();
+        let bytes: Vec<u8> = (0..3 * BUFFER_BYTES + 17).map(|at| ((at * at) >> 7) as u8).collect();
         let mut source = Source::new(Box::new(Cursor::new(bytes.clone()))).unwrap();
         let mut plain = Cursor::new(&bytes[..]);
         let (mut state, mut ends) = (7u64, 0);
