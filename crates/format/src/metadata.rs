@@ -51,6 +51,17 @@ pub struct Dicing {
     pub samples: u64,
 }
 
+/// What the model's coordinates mean on the Earth, as far as its file said; nothing of it is needed to draw.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReferenceSystem {
+    /// What the file called it.
+    pub name: Option<String>,
+    /// Number in the register of EPSG.
+    pub epsg: Option<u32>,
+    /// Description in well-known text.
+    pub wkt: Option<String>,
+}
+
 /// Facts about a file and how it was built. Never a time, a path or a machine: same input and options, same bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {
@@ -58,7 +69,8 @@ pub struct Metadata {
     pub generator: String,
     /// What was read.
     pub input: InputCounts,
-    /// Build options by their command-line names.
+    /// Build options by their command-line names, as they took effect. `units` is there where somebody said what a length of 1
+    /// is: `m`, `mm`, `cm`, `km`, `ft`, `us-ft` or `in`.
     pub options: BTreeMap<String, String>,
     /// All nodes.
     pub nodes: u64,
@@ -73,6 +85,9 @@ pub struct Metadata {
     pub closed: bool,
     /// Around all referenced vertices.
     pub bounds: Bounds,
+    /// Where the input said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_system: Option<ReferenceSystem>,
     /// Of `"normals"`, `"colors"`, …: what the nodes carry.
     pub attributes: Vec<String>,
     /// How large triangles were cut, if any were.

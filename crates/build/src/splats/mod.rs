@@ -51,7 +51,7 @@ use crate::{BuildError, Options};
 use checkpoint::{Facts, Stage};
 use divide::Division;
 use gigalod_format::splats::{Root, Skeleton};
-use gigalod_format::{Bounds, InputCounts, Kind, Metadata};
+use gigalod_format::{Bounds, InputCounts, Kind, Metadata, ReferenceSystem};
 use gigalod_import::ModelStream;
 use plan::MemoryPlan;
 use std::collections::BTreeMap;
@@ -79,8 +79,15 @@ pub fn build(
         .map_err(|error| BuildError::Threads(error.to_string()))?;
 
     let up = options.up.unwrap_or(input.up_axis());
+    let unit = options.unit.or(input.unit());
     let mut influential =
         BTreeMap::from([("as".into(), Kind::Splats.name().into()), ("up".into(), format!("{up:?}").to_lowercase())]);
+    influential.extend(unit.map(|unit| ("units".into(), unit.symbol().into())));
+    let reference_system = input.reference_system().map(|system| ReferenceSystem {
+        name: system.name.clone(),
+        epsg: system.epsg,
+        wkt: system.wkt.clone(),
+    });
     if let Some(spacing) = options.spacing {
         influential.insert("spacing".into(), spacing.to_string());
     }
@@ -181,6 +188,7 @@ pub fn build(
         raw_bytes: raw_bytes + skeleton.len() as u64,
         closed,
         bounds: Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() },
+        reference_system,
         attributes,
         dicing,
         per_level: levels,

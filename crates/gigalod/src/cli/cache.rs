@@ -4,6 +4,7 @@ use super::args::BuildOptions;
 use super::build::{Recovery, build};
 use super::error::CliError;
 use super::files;
+use super::inputs::{Inputs, Sense};
 use super::progress::Console;
 use gigalod_build::Progress;
 use std::io::Read;
@@ -22,7 +23,7 @@ pub(crate) fn container_of(file: &Path, options: &BuildOptions, console: &Consol
         return Ok(cached);
     }
     std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
-    build(file, &cached, options, None, Recovery::Lost, console)?;
+    build(&Inputs::one(file), &cached, options, Sense::default(), Recovery::Lost, console)?;
     console.detail(|| format!("{}: built as {}", file.display(), cached.display()));
     Ok(cached)
 }

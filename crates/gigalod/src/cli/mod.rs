@@ -9,6 +9,7 @@ mod demo;
 mod error;
 mod files;
 mod info;
+mod inputs;
 mod parse;
 mod path_file;
 mod progress;

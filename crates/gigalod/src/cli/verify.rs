@@ -3,14 +3,17 @@
 use super::args::VerifyArgs;
 use super::error::{CliError, Outcome};
 use super::files;
+use super::info::shown;
+use super::inputs::{Inputs, Sense};
 use super::progress::Console;
 use gigalod::verify::{self, Measured, Problems, Sampled};
 use gigalod_build::Progress;
+use gigalod_geom::LengthUnit;
+use gigalod_geom::camera::UpAxis;
 use gigalod_import::{Batch, Material, read_all};
 use gigalod_reference::Mesh;
 use serde::Serialize;
 use std::fmt::Write;
-use std::path::Path;
 
 /// The JSON object of `verify`.
 #[derive(Serialize)]
@@ -38,10 +41,9 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
     work.begin("check", splats.skeleton().pages().len() as u64);
     let (tree, mut problems) = verify::check(&splats, &mut |pages| work.at(pages));
     let mut measured = None;
-    if let Some(original) = &args.against
-        && problems.count == 0
-    {
-        let (model, materials) = read_model(original, &work)?;
+    if !args.against.is_empty() && problems.count == 0 {
+        let originals = Inputs::find(&args.against, console)?;
+        let (model, materials) = read_model(&originals, splats.skeleton().root().up, &work)?;
         let (origin, leaves) = (splats.skeleton().root().origin, splats.skeleton().root().leaves);
         let at = |done| work.at(done);
         let figures = if model.triangles.is_empty() {
@@ -50,7 +52,7 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
             verify::against_points(&tree, origin, &model.vertices, &at)
         } else {
             let sampled = metadata.dicing.map(|dicing| Sampled::of(dicing.spacing, &model, &materials));
-            let mesh = verify::mesh_of(model).map_err(|error| CliError::in_file(original, error))?;
+            let mesh = verify::mesh_of(model).map_err(|error| CliError::in_file(originals.name(), error))?;
             work.begin("measure", verify::steps(&tree, &mesh));
             match metadata.dicing {
                 Some(dicing) => expect_samples(leaves, dicing.samples, count_referenced(&mesh), &mut problems),
@@ -71,9 +73,10 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
     let verdict = if ok { "sound".to_string() } else { format!("{} problems", problems.count) };
     let _ = writeln!(text, "{}: {verdict}, {} nodes checked", args.file.display(), tree.nodes.len());
     if let Some(Measured { hausdorff, rms, worst_ratio, violations }) = measured {
+        let unit = metadata.options.get("units").map_or("model units".into(), |unit| shown(unit));
         let _ = writeln!(
             text,
-            "leaves against the original: largest distance {hausdorff:.4e}, rms {rms:.4e} (model units)\n\
+            "leaves against the original: largest distance {hausdorff:.4e}, rms {rms:.4e} ({unit})\n\
              all nodes: at most {worst_ratio:.4} of the stored error, {violations} violations"
         );
     }
@@ -126,10 +129,11 @@ fn count_referenced(mesh: &Mesh) -> u64 {
     referenced.iter().filter(|used| **used).count() as u64
 }
 
-/// Reads a whole model into memory, with its materials.
-fn read_model(path: &Path, work: &dyn Progress) -> Result<(Batch, Vec<Material>), CliError> {
-    let mut stream = files::open_model(path)?;
+/// Reads a whole model into memory, with its materials. Which way was up, and in which unit, when it was built is of no matter here.
+fn read_model(originals: &Inputs, up: UpAxis, work: &dyn Progress) -> Result<(Batch, Vec<Material>), CliError> {
+    let (mut stream, _) = originals.open(Sense { up: Some(up), unit: Some(LengthUnit::Metre) })?;
     work.begin("read", stream.bytes_consumed().1);
-    let all = read_all(&mut *stream, &mut |done, _| work.at(done)).map_err(|error| CliError::import(path, &error))?;
+    let all = read_all(&mut *stream, &mut |done, _| work.at(done))
+        .map_err(|error| CliError::import(originals.name(), &error))?;
     Ok((all, stream.materials().to_vec()))
 }

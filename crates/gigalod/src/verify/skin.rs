@@ -19,7 +19,7 @@ pub fn skin_of(stream: &mut dyn ModelStream, model: &Batch) -> Option<Skin> {
     for (number, material) in (0..).zip(&materials) {
         let texture = material.texture.as_ref().and_then(|texture| {
             *known.entry(texture.clone()).or_insert_with(|| {
-                skin.textures.push(picture(stream, number)?);
+                skin.textures.push(picture(stream, number, texture)?);
                 Some(skin.textures.len() as u32 - 1)
             })
         });
@@ -45,8 +45,8 @@ pub fn skin_of(stream: &mut dyn ModelStream, model: &Batch) -> Option<Skin> {
     Some(skin)
 }
 
-fn picture(stream: &mut dyn ModelStream, material: u32) -> Option<skin::Texture> {
-    let source = stream.open_picture(material).ok()?;
+fn picture(stream: &mut dyn ModelStream, material: u32, texture: &Texture) -> Option<skin::Texture> {
+    let source = stream.open_picture(material, texture).ok()?;
     let reader = ImageReader::new(BufReader::new(source)).with_guessed_format().ok()?;
     let rgba = reader.decode().ok()?.into_rgba8();
     let size = [rgba.width(), rgba.height()];

@@ -109,14 +109,14 @@ impl ModelStream for Painted {
         &self.looks
     }
 
-    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
-        match self.looks.get(material as usize).and_then(|look| look.texture.clone()) {
-            Some(Texture::Embedded(number)) if (number as usize) < self.pictures.len() => {
-                Ok(Box::new(Cursor::new(self.pictures[number as usize].clone())))
+    fn open_picture(&mut self, material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        match texture {
+            Texture::Embedded(number) if (*number as usize) < self.pictures.len() => {
+                Ok(Box::new(Cursor::new(self.pictures[*number as usize].clone())))
             }
             // As another stream says it.
             _ => gigalod::import::open_with(Box::new(Cursor::new("v 0 0 0\n")), Box::new(NoSideFiles))?
-                .open_picture(material),
+                .open_picture(material, texture),
         }
     }
 
@@ -162,8 +162,8 @@ impl ModelStream for Lent {
         self.0.materials()
     }
 
-    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
-        self.0.open_picture(material)
+    fn open_picture(&mut self, material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        self.0.open_picture(material, texture)
     }
 
     fn declared_vertices(&self) -> Option<u64> {

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     Attributes, Batch, ByteSource, CornerBatch, ImportError, Material, ModelStream, SideFiles, Texture, error::Problem,
 };
+use gigalod_geom::LengthUnit;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::{HashMap, hash_map::Entry};
 use std::io::Cursor;
@@ -388,20 +389,23 @@ impl ModelStream for GltfStream {
         self.attributes
     }
 
+    fn unit(&self) -> Option<LengthUnit> {
+        Some(LengthUnit::Metre)
+    }
+
     fn materials(&self) -> &[Material] {
         &self.materials
     }
 
-    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
-        match self.materials.get(material as usize).and_then(|material| material.texture.as_ref()) {
-            Some(Texture::File(name)) => {
+    fn open_picture(&mut self, _material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        match texture {
+            Texture::File(name) => {
                 self.side.open(name).map_err(|source| ImportError::new(Problem::Io { source }, None))
             }
-            Some(Texture::Embedded(number)) => {
+            Texture::Embedded(number) => {
                 let bytes = self.data.buffers.picture(&self.data.root, *number as usize)?;
                 Ok(Box::new(Cursor::new(bytes)))
             }
-            None => Err(ImportError::no_picture(material)),
         }
     }
 

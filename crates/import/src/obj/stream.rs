@@ -224,12 +224,12 @@ impl ModelStream for ObjStream {
         &self.materials.used
     }
 
-    fn open_picture(&mut self, material: u32) -> Result<Box<dyn ByteSource>, ImportError> {
-        match self.materials.used.get(material as usize).and_then(|material| material.texture.as_ref()) {
-            Some(Texture::File(name)) => {
+    fn open_picture(&mut self, material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        match texture {
+            Texture::File(name) => {
                 self.side.open(name).map_err(|source| ImportError::new(Problem::Io { source }, None))
             }
-            _ => Err(ImportError::no_picture(material)),
+            Texture::Embedded(_) => Err(ImportError::no_picture(material)),
         }
     }
 

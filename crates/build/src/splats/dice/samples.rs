@@ -139,7 +139,7 @@ fn shares(triangle: usize, grid: &Grid) -> impl Iterator<Item = (Item, u64)> {
                 break;
             }
         }
-        (cells > 0).then(|| (Item { triangle, rows: first..row, strips: None }, cells))
+        (cells > 0).then_some((Item { triangle, rows: first..row, strips: None }, cells))
     })
 }
 
@@ -285,11 +285,14 @@ impl Dice<'_> {
     }
 }
 
-/// What a triangle is painted with: a look, and its texture coordinates with how they grow along the axes of its grid.
+/// Texture coordinates of a triangle's corners, and how they grow along the axes of its grid.
+type Coords = ([[f64; 2]; 3], [[f64; 2]; 2]);
+
+/// What a triangle is painted with.
 struct Coat<'a> {
     paint: &'a Paint,
     look: &'a Look,
-    texture: Option<([[f64; 2]; 3], [[f64; 2]; 2])>,
+    texture: Option<Coords>,
 }
 
 impl Carried {

@@ -136,7 +136,7 @@ fn read_picture(
         phases.note(&format!("{name}: {why}; its material's colour is shown instead"));
         Ok(None)
     };
-    let source = match input.open_picture(material) {
+    let source = match input.open_picture(material, texture) {
         Ok(source) => source,
         Err(error) => return skip(&error.to_string()),
     };

@@ -15,10 +15,13 @@ use std::sync::{Arc, Mutex};
 
 type Tile = Vec<Texel>;
 
+/// Tiles by number, and when each was used last.
+type Shard = HashMap<u64, (Arc<Tile>, u64)>;
+
 /// Tiles in memory, those that were used last; many threads share them.
 pub(in super::super) struct Tiles<'a> {
     texels: &'a Spool<Texel>,
-    shards: Vec<Mutex<HashMap<u64, (Arc<Tile>, u64)>>>,
+    shards: Vec<Mutex<Shard>>,
     /// Most tiles of a shard.
     most: usize,
     clock: AtomicU64,
