@@ -78,6 +78,32 @@ fn a_missing_picture_is_noted_and_the_model_is_built() {
     run!["verify", out, "--against", obj].done();
 }
 
+/// Pictures of the same name in two folders are two.
+#[test]
+fn each_of_several_inputs_has_its_own_pictures() {
+    let place = tempfile::tempdir().unwrap();
+    let folders = ["first", "second"].map(|name| place.path().join(name));
+    let inputs = folders.each_ref().map(|folder| {
+        std::fs::create_dir(folder).unwrap();
+        walls(folder, 3)
+    });
+    let out = place.path().join("a.glod");
+    let build = || {
+        let ran = run!["build", inputs[0], inputs[1], "-o", out, "--spacing", "0.05"].done();
+        let notes: Vec<String> = ran.stderr.lines().filter(|line| line.starts_with("note: ")).map(Into::into).collect();
+        (std::fs::read(&out).unwrap(), notes)
+    };
+    let (alike, notes) = build();
+    assert_eq!(notes, Vec::<String>::new());
+    image::RgbImage::from_pixel(8, 8, image::Rgb([255, 0, 0])).save(folders[1].join("bricks.png")).unwrap();
+    let (different, notes) = build();
+    assert!(different != alike && notes.is_empty(), "{notes:?}");
+    std::fs::remove_file(folders[1].join("bricks.png")).unwrap();
+    let (missing, notes) = build();
+    assert!(missing != different && notes.len() == 1, "{notes:?}");
+    assert!(notes[0].starts_with("note: picture bricks.png of ") && notes[0].contains("second"), "{notes:?}");
+}
+
 #[test]
 fn interrupted_after_each_phase_a_diced_model_ends_with_the_same_bytes() {
     let inputs = tempfile::tempdir().unwrap();
