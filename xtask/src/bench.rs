@@ -5,6 +5,7 @@
 
 mod building;
 mod drawing;
+mod importing;
 
 use crate::figures::{self, Row};
 use crate::program::{Program, number};
@@ -29,7 +30,8 @@ struct Scope<'a> {
 /// A heading, and what fills its table.
 type Section = (&'static str, fn(&Bench, Scope<'_>, &mut Vec<Row>) -> Result<()>);
 
-const SECTIONS: [Section; 2] = [("building", building::rows), ("drawing", drawing::rows)];
+const SECTIONS: [Section; 3] =
+    [("importing", importing::rows), ("building", building::rows), ("drawing", drawing::rows)];
 
 pub(crate) fn bench(arguments: &[String]) -> Result<()> {
     let scope = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
@@ -37,7 +39,7 @@ pub(crate) fn bench(arguments: &[String]) -> Result<()> {
         ["--large"] => Scope { large: true, only: None },
         ["--only", section] => Scope { large: false, only: Some(section) },
         ["--large", "--only", section] => Scope { large: true, only: Some(section) },
-        _ => bail!("usage: cargo xtask bench [--large] [--only building|drawing]"),
+        _ => bail!("usage: cargo xtask bench [--large] [--only importing|building|drawing]"),
     };
     setup::system()?;
     let bench = Bench(Program::build("bench")?);
@@ -91,6 +93,16 @@ impl Bench {
 
     /// Runs an example of a package, given arguments in the folder of models; the JSON object that it prints.
     fn example(&self, package: &str, name: &str, arguments: &[&str]) -> Result<Value> {
+        let text = self.output(package, name, arguments)?;
+        serde_json::from_str(&text).with_context(|| format!("example {name}: {text}"))
+    }
+
+    /// The same for one that prints lines.
+    fn lines(&self, package: &str, name: &str, arguments: &[&str]) -> Result<Vec<String>> {
+        Ok(self.output(package, name, arguments)?.lines().map(String::from).collect())
+    }
+
+    fn output(&self, package: &str, name: &str, arguments: &[&str]) -> Result<String> {
         run(&mut cargo(&["build", "--release", "--quiet", "--package", package, "--example", name]))?;
         let program = target().join("release/examples").join(name);
         let out = Command::new(program.canonicalize()?).args(arguments).current_dir(&self.0.folder).output()?;
@@ -98,7 +110,7 @@ impl Bench {
         if !out.status.success() {
             bail!("example {name} {}: {text}{}", arguments.join(" "), String::from_utf8_lossy(&out.stderr));
         }
-        serde_json::from_str(&text).with_context(|| format!("example {name}: {text}"))
+        Ok(text.into_owned())
     }
 }
 
