@@ -11,7 +11,7 @@ use crate::figures::{self, Row};
 use crate::program::{Program, number};
 use crate::setup;
 use crate::steps::{cargo, project, run, target};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -23,7 +23,7 @@ const RUNS: usize = 3;
 struct Scope<'a> {
     /// Also a model of 100 million triangles.
     large: bool,
-    /// One section instead of all: printed, not written.
+    /// One section instead of all.
     only: Option<&'a str>,
 }
 
@@ -43,30 +43,43 @@ pub(crate) fn bench(arguments: &[String]) -> Result<()> {
     };
     setup::system()?;
     let bench = Bench(Program::build("bench")?);
-    let mut report = String::new();
+    let path = project().join("docs/benchmarks.md");
+    let mut found = false;
     for (name, fill) in SECTIONS.iter().filter(|(name, _)| scope.only.is_none_or(|only| only == *name)) {
         let mut rows = Vec::new();
         fill(&bench, scope, &mut rows)?;
-        report.push_str(&format!("\n## {}{}\n\n", name[..1].to_uppercase(), &name[1..]));
-        figures::table(&rows, &mut report);
+        let mut section = format!("## {}{}\n\n{}\n\n", name[..1].to_uppercase(), &name[1..], origin(scope.large)?);
+        figures::table(&rows, &mut section);
+        print!("\n{section}");
+        // Each as soon as it is measured, so that none is lost with a later one.
+        let before = std::fs::read_to_string(&path).unwrap_or_default();
+        std::fs::write(&path, with_section(&before, &section))?;
+        found = true;
     }
-    if report.is_empty() {
-        bail!("no such section: {}", scope.only.unwrap_or_default());
-    }
-    print!("{report}");
-    if scope.only.is_none() {
-        std::fs::write(project().join("docs/benchmarks.md"), format!("{}{report}", preface(scope.large)?))?;
-    }
+    ensure!(found, "no such section: {}", scope.only.unwrap_or_default());
     Ok(())
 }
 
-fn preface(large: bool) -> Result<String> {
-    Ok(format!(
-        "# Benchmarks\n\nWritten by `cargo xtask bench{}` on {}; default options unless said otherwise. Times are user\n\
-         and system seconds, of builds the median of {RUNS} runs, page cache warm. A target that is missed says so.\n",
-        if large { " --large" } else { "" },
-        figures::machine()?
-    ))
+const PREFACE: &str = "# Benchmarks
+
+Written by `cargo xtask bench`; default options unless said otherwise. Times are user and system seconds, of builds the median
+of three runs, page cache warm. A target that is missed says so.
+";
+
+fn origin(large: bool) -> Result<String> {
+    Ok(format!("With{} models of 100 million triangles, on {}.", if large { "" } else { "out" }, figures::machine()?))
+}
+
+/// The report with a section in place of what stood under its heading; others stay, in their order.
+fn with_section(report: &str, section: &str) -> String {
+    let heading = |text: &str| text.lines().next().unwrap_or_default().to_owned();
+    let parts = report.split("\n## ").skip(1).map(|part| format!("## {}\n", part.trim_end()));
+    let mut sections: Vec<String> = parts.collect();
+    match sections.iter_mut().find(|old| heading(old) == heading(section)) {
+        Some(old) => *old = section.to_owned(),
+        None => sections.push(section.to_owned()),
+    }
+    format!("{PREFACE}\n{}", sections.join("\n"))
 }
 
 /// The program and its folder of models.
@@ -129,4 +142,18 @@ fn middle(mut reports: Vec<Value>, key: &str) -> Value {
     reports.sort_by(|a, b| number(a, key).total_cmp(&number(b, key)));
     let middle = reports.len() / 2;
     reports.swap_remove(middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_section;
+
+    #[test]
+    fn a_section_takes_the_place_of_the_old_one() {
+        let first = with_section("", "## Building\n\n| a |\n");
+        let both = with_section(&first, "## Drawing\n\n| b |\n");
+        assert!(both.ends_with("\n\n## Building\n\n| a |\n\n## Drawing\n\n| b |\n"), "{both}");
+        let again = with_section(&both, "## Building\n\n| c |\n");
+        assert_eq!(again, both.replace("| a |", "| c |"));
+    }
 }
