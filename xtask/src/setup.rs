@@ -23,19 +23,42 @@ const NEEDS: [Need; 2] = [
     },
 ];
 
+/// What tests of the viewer need besides.
+const NEEDS_OF_TESTS: [Need; 2] = [
+    Need {
+        what: "a virtual X server and a hand for it",
+        packages: &["xvfb", "xdotool"],
+        is_there: || exists("Xvfb", "-help") && exists("xdotool", "version"),
+    },
+    Need {
+        what: "libraries of X11",
+        packages: &["libx11-6", "libx11-xcb1", "libxcursor1", "libxi6", "libxrandr2", "libxkbcommon-x11-0"],
+        is_there: || {
+            let libraries = libraries();
+            ["libX11.so.6", "libX11-xcb.so.1", "libXcursor.so.1", "libXi.so.6", "libxkbcommon-x11.so.0"]
+                .iter()
+                .all(|name| libraries.contains(name))
+        },
+    },
+];
+
 /// Installs what drawing and testing need.
 pub(crate) fn everything() -> Result<()> {
-    system()?;
+    install(NEEDS.iter().chain(&NEEDS_OF_TESTS))?;
     web_target()
 }
 
 /// Compiler and driver.
 pub(crate) fn system() -> Result<()> {
+    install(NEEDS.iter())
+}
+
+fn install<'a>(needs: impl Iterator<Item = &'a Need> + Clone) -> Result<()> {
     if !cfg!(target_os = "linux") {
         // Metal and Direct3D come with the system, and Rust's own requirements bring a C++ compiler.
         return Ok(());
     }
-    let missing: Vec<&Need> = NEEDS.iter().filter(|need| !(need.is_there)()).collect();
+    let missing: Vec<&Need> = needs.clone().filter(|need| !(need.is_there)()).collect();
     if missing.is_empty() {
         return Ok(());
     }
@@ -58,7 +81,7 @@ pub(crate) fn system() -> Result<()> {
     };
     apt(&["update"])?;
     apt(&[&["install", "--no-install-recommends"], &packages[..]].concat())?;
-    match NEEDS.iter().find(|need| !(need.is_there)()) {
+    match needs.into_iter().find(|need| !(need.is_there)()) {
         Some(need) => bail!("still missing after installation: {}", need.what),
         None => Ok(()),
     }
@@ -85,8 +108,18 @@ fn has_vulkan() -> bool {
         .any(|mut entries| entries.next().is_some())
         || std::env::var_os("VK_DRIVER_FILES").is_some()
         || std::env::var_os("VK_ICD_FILENAMES").is_some();
+    has_driver && libraries().contains("libvulkan.so.1")
+}
+
+/// What the loader of libraries knows; empty where it does not tell.
+fn libraries() -> String {
     let loader = Command::new("sh").args(["-c", "PATH=$PATH:/sbin:/usr/sbin ldconfig -p"]).output();
-    has_driver && loader.is_ok_and(|out| String::from_utf8_lossy(&out.stdout).contains("libvulkan.so.1"))
+    loader.map(|out| String::from_utf8_lossy(&out.stdout).into_owned()).unwrap_or_default()
+}
+
+/// True when there is such a program, whatever it thinks of the argument.
+fn exists(program: &str, argument: &str) -> bool {
+    Command::new(program).arg(argument).stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok()
 }
 
 fn is_root() -> bool {

@@ -29,6 +29,9 @@ pub(crate) fn test() -> Result<()> {
     };
     step("format", &mut cargo(&["fmt", "--all", "--check"]))?;
     step("lints", &mut cargo(&["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"]))?;
+    // Servers draw without a window: the program must not need the viewer's libraries.
+    let headless = ["clippy", "--package", "gigalod", "--no-default-features", "--", "--deny", "warnings"];
+    step("lints without a window", &mut cargo(&headless))?;
     step(
         "documentation",
         cargo(&["doc", "--workspace", "--no-deps", "--document-private-items"]).env("RUSTDOCFLAGS", "--deny warnings"),

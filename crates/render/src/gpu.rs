@@ -4,6 +4,7 @@
 //! device stays lost, and says so whatever else went wrong.
 
 use crate::RenderError;
+use gigalod_geom::ImageSize;
 use std::sync::{Arc, Mutex};
 
 /// How much of what a device can do may be used. The picture is the same, but for what [`GpuLevel::WebGl`] says.
@@ -35,8 +36,8 @@ impl GpuLevel {
     }
 }
 
-/// An open graphics device.
-#[derive(Debug)]
+/// An open graphics device. Clones are the same one.
+#[derive(Clone, Debug)]
 pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -45,6 +46,8 @@ pub struct Gpu {
     wanted: GpuLevel,
     /// Got.
     level: GpuLevel,
+    /// A texture can be looked at in another format than its own.
+    pub(crate) has_view_formats: bool,
     faults: Arc<Mutex<Faults>>,
 }
 
@@ -87,7 +90,12 @@ impl Gpu {
                 find_adapter(wgpu::Backends::all()).await.map_err(|error| RenderError::NoAdapter(error.to_string()))?
             }
         };
-        let level = wanted.min(highest_level(&adapter));
+        Self::of_adapter(&adapter, wanted).await
+    }
+
+    /// Opens an adapter.
+    pub(crate) async fn of_adapter(adapter: &wgpu::Adapter, wanted: GpuLevel) -> Result<Self, RenderError> {
+        let level = wanted.min(highest_level(adapter));
         let required_features =
             if level == GpuLevel::Native { WIDE_KEYS & adapter.features() } else { wgpu::Features::empty() };
         // The adapter's own limits: pictures and buffers may be as large as it can. Nothing relies on more than the baseline.
@@ -118,7 +126,8 @@ impl Gpu {
             };
             keep_lost.lock().expect("nobody panics while holding it").lost.get_or_insert(why);
         });
-        Ok(Self { device, queue, info: adapter.get_info(), wanted, level, faults })
+        let has_view_formats = adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS);
+        Ok(Self { device, queue, info: adapter.get_info(), wanted, level, has_view_formats, faults })
     }
 
     /// Name of the adapter, and through which interface it is driven.
@@ -160,10 +169,36 @@ impl Gpu {
         faults.lost.get_or_insert_with(|| "it was given up".into());
     }
 
+    /// A texture of sRGB values that a window can also show as the bytes that they are, where the device allows it.
+    pub(crate) fn create_shown_texture(
+        &self,
+        label: &str,
+        size: ImageSize,
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        let bytes = [format.remove_srgb_suffix()];
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: if self.has_view_formats { &bytes } else { &[] },
+        })
+    }
+
     /// Bytes that a buffer may have, and that a pass can see of it.
     pub(crate) fn most_buffer_bytes(&self) -> u64 {
         let limits = self.device.limits();
         limits.max_buffer_size.min(limits.max_storage_buffer_binding_size.max(1 << 20)).min(1 << 30)
+    }
+
+    /// True where the device is gone.
+    pub fn is_lost(&self) -> bool {
+        self.faults.lock().expect("nobody panics while holding it").lost.is_some()
     }
 
     /// The first error since the last call, if there was one.

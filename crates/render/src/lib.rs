@@ -17,6 +17,8 @@ mod renderer;
 mod shader;
 mod splats;
 mod staging;
+#[cfg(feature = "window")]
+pub mod window;
 
 pub use error::RenderError;
 pub use gpu::{Gpu, GpuLevel};

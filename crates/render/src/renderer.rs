@@ -82,6 +82,13 @@ struct Targets {
     picture: wgpu::Texture,
 }
 
+impl Targets {
+    /// Frees them at once; the picture when nobody shows it any more.
+    fn free(self) {
+        self.gbuffer.free();
+    }
+}
+
 /// Buffers that are kept.
 #[derive(Debug)]
 struct Buffers {
@@ -170,7 +177,16 @@ impl Renderer {
     /// # Errors
     /// As for [`Gpu::open`] and [`Renderer::new`]; then it is still the old one.
     pub fn recover(&mut self) -> Result<(), RenderError> {
-        let fresh = Self::new(Gpu::open_at(self.gpu.wanted_level())?)?;
+        let fresh = Gpu::open_at(self.gpu.wanted_level())?;
+        self.move_to(fresh)
+    }
+
+    /// Goes on with another device, and forgets the old one, as [`Renderer::recover`] does.
+    ///
+    /// # Errors
+    /// As for [`Renderer::new`]; then it still has the old one.
+    pub fn move_to(&mut self, gpu: Gpu) -> Result<(), RenderError> {
+        let fresh = Self::new(gpu)?;
         *self = Self { budget: self.budget, compute_extent_px: self.compute_extent_px, ..fresh };
         Ok(())
     }
@@ -198,6 +214,13 @@ impl Renderer {
         }
         let drawn = self.submit_last().and_then(|()| self.gpu.wait());
         self.survive(drawn).map(|()| true)
+    }
+
+    /// The picture that was drawn last, where it lies on the device, for a window to show; `None` before the first. The next one
+    /// overwrites it.
+    #[cfg(feature = "window")]
+    pub fn shown(&self) -> Option<crate::window::Shown> {
+        self.targets.as_ref().map(|targets| crate::window::Shown::new(&targets.picture, targets.gbuffer.size))
     }
 
     /// [`Renderer::draw`], and brings the picture to the host.
@@ -357,13 +380,14 @@ impl Renderer {
         let other = Staging::BYTES + targets_bytes(size);
         let stale = self.targets.take_if(|targets| targets.gbuffer.size != size);
         if let Some(targets) = stale {
-            targets.gbuffer.free();
-            targets.picture.destroy();
+            targets.free();
         }
         memory::fit(&self.gpu, &mut self.buffers.all_mut(), other, self.budget)?;
         if self.targets.is_none() {
-            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
-            let picture = gbuffer::create_texture(&self.gpu.device, "picture", size, PICTURE, usage);
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::COPY_SRC
+                | wgpu::TextureUsages::TEXTURE_BINDING;
+            let picture = self.gpu.create_shown_texture("picture", size, PICTURE, usage);
             self.targets = Some(Targets { gbuffer: GBuffer::new(&self.gpu.device, size), picture });
             self.gpu.check()?;
         }
@@ -379,8 +403,7 @@ impl Renderer {
             self.buffers.all_mut().into_iter().for_each(Pool::free);
             self.buffers.chunks.clear();
             if let Some(targets) = self.targets.take() {
-                targets.gbuffer.free();
-                targets.picture.destroy();
+                targets.free();
             }
             // What came after the first error is its consequence; a lost device says so again.
             let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());

@@ -25,6 +25,8 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
+    #[cfg(feature = "view")]
+    View(Box<ViewArgs>),
     Build(BuildArgs),
     Render(Box<RenderArgs>),
     Bench(Box<BenchArgs>),
@@ -112,7 +114,7 @@ pub(crate) enum UpAxisArg {
     gigalod render statue.glod -o face.png --orbit 30,10,4 --error 0.5\n  \
     gigalod render statue.glod -o levels.png --lod-colors --error 8")]
 pub(crate) struct RenderArgs {
-    /// Model: .glod, or a raw one
+    /// Model: .glod, or a raw one; or a scene: .toml
     pub(crate) file: PathBuf,
     /// Picture to write, a PNG; replaced if it exists
     #[arg(short, long, value_name = "OUT.png")]
@@ -143,12 +145,12 @@ pub(crate) struct DrawArgs {
     /// Shape of splats
     #[arg(long, value_enum, default_value_t = KernelArg::Round)]
     pub(crate) kernel: KernelArg,
-    /// Direction towards the light [default: a lamp at the viewer's shoulder]
+    /// Direction towards the light [default: the scene's, or a lamp at the viewer's shoulder]
     #[arg(long, value_parser = parse::direction, allow_hyphen_values = true, value_name = "X,Y,Z")]
     pub(crate) light: Option<DVec3>,
-    /// Colour where there is nothing
-    #[arg(long, default_value = "#202024", value_parser = parse::color, value_name = "#RRGGBB")]
-    pub(crate) background: [u8; 3],
+    /// Colour where there is nothing [default: the scene's, or #202024]
+    #[arg(long, value_parser = parse::color, value_name = "#RRGGBB")]
+    pub(crate) background: Option<[u8; 3]>,
     /// Colour each level of detail differently
     #[arg(long)]
     pub(crate) lod_colors: bool,
@@ -170,7 +172,7 @@ pub(crate) struct DrawArgs {
 #[command(after_help = "Examples:\n  gigalod synth path walk --around statue.glod -o walk.json\n  \
     gigalod bench statue.glod --path walk.json\n  gigalod bench statue.glod --path walk.json --target-ms 100 --json")]
 pub(crate) struct BenchArgs {
-    /// Model: .glod, or a raw one
+    /// Model: .glod, or a raw one; or a scene: .toml
     pub(crate) file: PathBuf,
     /// Camera path, as `gigalod synth path` makes them
     #[arg(long, value_name = "PATH.json")]
@@ -183,6 +185,42 @@ pub(crate) struct BenchArgs {
     pub(crate) fov: Option<f64>,
     #[command(flatten)]
     pub(crate) draw: DrawArgs,
+    #[command(flatten)]
+    pub(crate) build: BuildOptions,
+}
+
+/// Open a window and move through models
+///
+/// FILE is a model (.glod, or a raw one, which is built into the cache first), a scene (.toml), a folder of models to choose from,
+/// or a camera path (.json) to play. Several are shown together; more can be dropped onto the window. F1 tells what mouse and keys
+/// do.
+///
+/// A scene names models and where they stand, everything else is optional; paths are relative to it:
+///
+///     up = "y"
+///     background = "#202020"
+///     [camera]   eye, target, up = [x,y,z]; fov = 40.0
+///     [[model]]  file = "statue.glod"; position = [x,y,z]; rotation = [x,y,z,w]; scale = 1.0
+///                instances = "trees.bin"    # instead: many (position, quaternion, scale) as f32
+///     [[light]]  kind = "directional"; direction = [x,y,z]    # towards it
+#[cfg(feature = "view")]
+#[derive(Args, Debug)]
+#[command(
+    verbatim_doc_comment,
+    after_help = "Examples:\n  gigalod view statue.glod\n  gigalod view scan.ply.gz\n  \
+    gigalod view left.glod right.glod --size 1920x1080 --target-ms 33"
+)]
+pub(crate) struct ViewArgs {
+    /// Models, scenes, folders or camera paths
+    #[arg(value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Milliseconds that a frame should take while the camera moves
+    #[arg(long, default_value = "50", value_parser = parse::positive, value_name = "MS")]
+    pub(crate) target_ms: f64,
+    #[command(flatten)]
+    pub(crate) draw: DrawArgs,
+    #[command(flatten)]
+    pub(crate) camera: CameraArgs,
     #[command(flatten)]
     pub(crate) build: BuildOptions,
 }

@@ -1,11 +1,11 @@
 //! `gigalod bench`: a camera path, measured frame by frame.
 
 use super::args::BenchArgs;
-use super::cache;
 use super::error::{CliError, Outcome};
 use super::path_file;
 use super::progress::Console;
 use super::stage::{CAMERA, Stage, Wait};
+use super::subject::Subject;
 use gigalod_build::Progress;
 use gigalod_geom::{Camera, CameraPath};
 use gigalod_render::{Look, Renderer};
@@ -83,10 +83,10 @@ struct Run<'a> {
 
 pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliError> {
     let path = path_file::read(&args.path)?;
-    let file = cache::container_of(&args.file, &args.build, console)?;
-    let mut stage = Stage::open(&file, args.draw.budgets())?;
+    let subject = Subject::open(&args.file, &args.build, console)?;
+    let mut stage = Stage::open(&subject, args.draw.budgets())?;
     stage.scene.splats_mut().tint = args.draw.tint();
-    let look = args.draw.look();
+    let look = args.draw.look(&subject.description);
     let mut run = Run { stage: &mut stage, path, args, console, look, frames: Vec::new(), last: CutReport::default() };
     let on_path = match args.target_ms {
         None => run.each_pose()?,

@@ -12,20 +12,53 @@ use std::path::{Path, PathBuf};
 
 /// A `.glod` file for `file`: itself, or what it builds into.
 pub(crate) fn container_of(file: &Path, options: &BuildOptions, console: &Console) -> Result<PathBuf, CliError> {
+    let work = console.work(&file.file_name().unwrap_or_default().to_string_lossy());
+    let mut has_begun = false;
+    let found = find(file, options.spacing, &mut |done, total| {
+        if !std::mem::replace(&mut has_begun, true) {
+            work.begin("read", total);
+        }
+        work.at(done);
+        true
+    })?;
+    work.finish();
+    match found {
+        Found::Itself => Ok(file.to_owned()),
+        Found::Built(cached) => {
+            console.detail(|| format!("{}: built before as {}", file.display(), cached.display()));
+            Ok(cached)
+        }
+        Found::NotBuilt(cached) => {
+            build(&Inputs::one(file), &cached, options, Sense::default(), Recovery::Lost, console)?;
+            console.detail(|| format!("{}: built as {}", file.display(), cached.display()));
+            Ok(cached)
+        }
+    }
+}
+
+/// What there is of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Found {
+    /// It is a `.glod` file.
+    Itself,
+    /// It was built before, as this.
+    Built(PathBuf),
+    /// It is to be built, as this; the folder is there.
+    NotBuilt(PathBuf),
+}
+
+/// Looks a file up that would be built with this spacing; `at` is told how many bytes of how many were read, and says whether to go on.
+pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<Found, CliError> {
     if files::is_container(file)? {
-        return Ok(file.to_owned());
+        return Ok(Found::Itself);
     }
     let folder = folder()?;
-    let name = format!("{}.glod", key(file, options, console)?);
-    let cached = folder.join(name);
+    let cached = folder.join(format!("{}.glod", key(file, spacing, at)?));
     if cached.is_file() && files::open_splats(&cached).is_ok() {
-        console.detail(|| format!("{}: built before as {}", file.display(), cached.display()));
-        return Ok(cached);
+        return Ok(Found::Built(cached));
     }
     std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
-    build(&Inputs::one(file), &cached, options, Sense::default(), Recovery::Lost, console)?;
-    console.detail(|| format!("{}: built as {}", file.display(), cached.display()));
-    Ok(cached)
+    Ok(Found::NotBuilt(cached))
 }
 
 fn folder() -> Result<PathBuf, CliError> {
@@ -39,26 +72,26 @@ fn folder() -> Result<PathBuf, CliError> {
 }
 
 /// Depends on all bytes of the file, the spacing asked for and the program's version; memory and threads do not change what is built.
-fn key(file: &Path, options: &BuildOptions, console: &Console) -> Result<String, CliError> {
+fn key(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<String, CliError> {
     let wrong = |error| CliError::in_file(file, error);
     let mut source = files::open(file)?;
     let total = source.metadata().map_err(wrong)?.len();
-    let work = console.work(&file.file_name().unwrap_or_default().to_string_lossy());
-    work.begin("read", total);
     let mut hasher = blake3::Hasher::new();
     hasher.update(concat!("gigalod ", env!("CARGO_PKG_VERSION"), " splats\n").as_bytes());
-    if let Some(spacing) = options.spacing {
+    if let Some(spacing) = spacing {
         hasher.update(format!("spacing {spacing}\n").as_bytes());
     }
     let mut buffer = vec![0; 1 << 20];
     let mut done = 0;
     loop {
+        if !at(done, total) {
+            return Err(CliError::in_file(file, "cancelled"));
+        }
         let read = source.read(&mut buffer).map_err(wrong)?;
         if read == 0 {
             return Ok(hasher.finalize().to_hex()[..32].to_string());
         }
         hasher.update(&buffer[..read]);
         done += read as u64;
-        work.at(done);
     }
 }

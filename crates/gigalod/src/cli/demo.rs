@@ -8,6 +8,7 @@ use super::parse::readable_bytes;
 use super::progress::Console;
 use super::render::Job;
 use super::stage::{Budgets, Stage};
+use super::subject::Subject;
 use super::synth::{SynthReport, write_statue};
 use gigalod_geom::camera::DEFAULT_FOV_DEG;
 use gigalod_geom::{Camera, ImageSize};
@@ -81,7 +82,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliErro
     let report = build(&Inputs::one(&scan), &built, &build_options, Sense::default(), Recovery::Lost, console)?;
     let _ = writeln!(text, "{}: {}", built.display(), readable_bytes(report.output_bytes));
 
-    let mut stage = Stage::open(&built, Budgets { cpu: 1 << 30, gpu: None })?;
+    let mut stage = Stage::open(&Subject::of_container(&built)?, Budgets { cpu: 1 << 30, gpu: None })?;
     let size = ImageSize { width: 1280, height: 720 };
     for shot in &SHOTS {
         let picture = folder.join(shot.file);

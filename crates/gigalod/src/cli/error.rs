@@ -64,6 +64,12 @@ impl CliError {
         self
     }
 
+    /// Says where in the file.
+    pub(crate) fn at(mut self, place: impl Into<String>) -> Self {
+        self.place = Some(place.into());
+        self
+    }
+
     pub(crate) fn import(file: &Path, error: &ImportError) -> Self {
         let file = error.file().map_or(file, Path::new);
         let wrong = Self { place: error.place().map(ToString::to_string), ..Self::in_file(file, error.what()) };

@@ -7,6 +7,8 @@ mod cache;
 mod compare;
 mod demo;
 mod error;
+#[cfg(feature = "view")]
+mod exact;
 mod files;
 mod info;
 mod inputs;
@@ -14,10 +16,16 @@ mod parse;
 mod path_file;
 mod progress;
 mod render;
+mod scene_file;
 mod stage;
+mod subject;
 mod synth;
 mod usage;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
+#[cfg(feature = "view")]
+mod view_files;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -48,6 +56,8 @@ pub(crate) fn run() -> ExitCode {
     });
     let console = progress::Console::new(cli.verbose);
     let outcome = match &cli.command {
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(args, &console),
         Command::Build(args) => build::run(args, &console),
         Command::Render(args) => render::run(args, &console),
         Command::Bench(args) => bench::run(args, &console),

@@ -61,6 +61,16 @@ pub(crate) fn read(path: &Path) -> Result<CameraPath, CliError> {
     Ok(CameraPath { up: DVec3::from_array(file.up), fov_deg: file.fov, frames: file.frames.iter().map(pose).collect() })
 }
 
+/// One pose of a path, by its number from 0.
+pub(crate) fn pose(path: &Path, frame: usize) -> Result<(Pose, CameraPath), CliError> {
+    let camera_path = read(path)?;
+    let count = camera_path.frames.len();
+    match camera_path.frames.get(frame) {
+        Some(pose) => Ok((*pose, camera_path)),
+        None => Err(CliError::in_file(path, format!("no frame {frame}, expected 0 to {}", count - 1))),
+    }
+}
+
 pub(crate) fn write(path: &Path, camera_path: &CameraPath) -> Result<u64, CliError> {
     let file = PathFile {
         up: camera_path.up.to_array(),

@@ -18,6 +18,9 @@ pub(crate) struct Console {
 /// Without a terminal, a line at most so often.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
+/// The same with `-v`.
+const VERBOSE_LINE_EVERY: Duration = Duration::from_millis(250);
+
 impl Console {
     pub(crate) fn new(verbose: bool) -> Self {
         Self { verbose, on_terminal: std::io::stderr().is_terminal() }
@@ -38,6 +41,10 @@ impl Console {
         if self.verbose {
             self.line(text());
         }
+    }
+
+    fn line_every(&self) -> Duration {
+        if self.verbose { VERBOSE_LINE_EVERY } else { LINE_EVERY }
     }
 
     /// Progress of one piece of work.
@@ -108,7 +115,7 @@ impl Progress for Work<'_> {
         let mut state = self.state.lock().expect("nobody panics while holding it");
         let Some(phase) = &mut *state else { return };
         phase.bar.set_position(done);
-        if !self.console.on_terminal && phase.total > 0 && phase.last_line.elapsed() >= LINE_EVERY {
+        if !self.console.on_terminal && phase.total > 0 && phase.last_line.elapsed() >= self.console.line_every() {
             phase.last_line = Instant::now();
             let percent = done.saturating_mul(100) / phase.total;
             let left = phase.bar.eta().as_secs();

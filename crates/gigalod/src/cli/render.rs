@@ -1,13 +1,13 @@
 //! `gigalod render`.
 
 use super::args::{CameraArgs, RenderArgs};
-use super::cache;
 use super::error::{CliError, Outcome};
 use super::files;
 use super::path_file;
 use super::progress::Console;
 use super::stage::{Drawn, Stage, Wait};
-use gigalod_geom::camera::{DEFAULT_FOV_DEG, UpAxis};
+use super::subject::Subject;
+use gigalod_geom::camera::DEFAULT_FOV_DEG;
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use gigalod_render::{Look, Picture, Renderer};
 use gigalod_runtime::splats::Tint;
@@ -70,13 +70,13 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
         files::check_output(output, &inputs)?;
     }
     files::check_png_name(&args.output)?;
-    let file = cache::container_of(&args.file, &args.build, console)?;
-    let mut stage = Stage::open(&file, args.draw.budgets())?;
-    let camera = camera(&args.camera, args.draw.size, &stage.bounds(), stage.up())?;
+    let subject = Subject::open(&args.file, &args.build, console)?;
+    let mut stage = Stage::open(&subject, args.draw.budgets())?;
+    let camera = camera(&args.camera, args.draw.size, &stage.bounds(), &subject)?;
     let job = Job {
         camera,
         threshold_px: args.draw.threshold_px(),
-        look: args.draw.look(),
+        look: args.draw.look(&subject.description),
         tint: args.draw.tint(),
         output: &args.output,
         depth: args.depth.as_deref(),
@@ -153,24 +153,27 @@ fn finish(report: &CutReport) -> String {
     }
 }
 
-/// The camera that the options ask for.
-fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, up: UpAxis) -> Result<Camera, CliError> {
+/// The camera that the options ask for; without any, the scene's.
+fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, subject: &Subject) -> Result<Camera, CliError> {
+    let (scene, up) = (subject.description.camera.unwrap_or_default(), subject.up());
     let fov_rad = |degrees: Option<f64>| degrees.unwrap_or(DEFAULT_FOV_DEG).to_radians();
     if let (Some(eye), Some(target)) = (args.eye, args.target) {
-        return Ok(Camera::look_at(eye, target, args.up.unwrap_or(up.direction()), fov_rad(args.fov), size));
+        let fov = fov_rad(args.fov.or(scene.fov_deg));
+        return Ok(Camera::look_at(eye, target, args.up.unwrap_or(up.direction()), fov, size));
     }
     if let (Some(path), Some(frame)) = (&args.path, args.frame) {
-        let camera_path = path_file::read(path)?;
-        let count = camera_path.frames.len();
-        let pose = camera_path
-            .frames
-            .get(frame)
-            .ok_or_else(|| CliError::in_file(path, format!("no frame {frame}, expected 0 to {}", count - 1)))?;
+        let (pose, camera_path) = path_file::pose(path, frame)?;
         let fov = fov_rad(args.fov.or(Some(camera_path.fov_deg)));
         return Ok(Camera::look_at(pose.eye, pose.target, camera_path.up, fov, size));
     }
+    let fov = fov_rad(args.fov.or(scene.fov_deg));
     let [azimuth, elevation, zoom] = args.orbit.unwrap_or([0.0, 0.0, 1.0]);
-    Ok(Camera::orbit(bounds, up, [azimuth, elevation], zoom, fov_rad(args.fov), size))
+    let whole = Camera::orbit(bounds, up, [azimuth, elevation], zoom, fov, size);
+    if args.orbit.is_some() || scene.eye.is_none() && scene.target.is_none() {
+        return Ok(whole);
+    }
+    let (eye, target) = (scene.eye.unwrap_or(whole.eye), scene.target.unwrap_or(bounds.center()));
+    Ok(Camera::look_at(eye, target, scene.up.unwrap_or(up.direction()), fov, size))
 }
 
 fn write_depth(path: &Path, picture: &Picture) -> Result<(), CliError> {

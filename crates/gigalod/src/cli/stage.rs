@@ -1,18 +1,17 @@
-//! A model open for drawing: scene, loaders and graphics device, as `render`, `bench` and `demo` use them.
+//! Models open for drawing: scene, loaders and graphics device, as `render`, `bench` and `demo` use them.
 
 use super::args::DrawArgs;
 use super::error::CliError;
-use super::files;
 use super::progress::Console;
-use gigalod_format::splats::SplatFile;
+use super::subject::Subject;
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera};
 use gigalod_render::{Frame, Gpu, Lighting, Look, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
+use gigalod_runtime::scene::description::SceneDescription;
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Fineness, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{CutReport, FileId, Fineness, Instance, Residency, Scene, ViewId};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// The one view of a picture.
@@ -24,7 +23,7 @@ const MOST_LOSSES: u32 = 3;
 /// Where there is no memory for so few, coarser will not help.
 const FEWEST_SPLATS: u64 = 1000;
 
-/// A model open for drawing.
+/// Models open for drawing.
 pub(crate) struct Stage {
     pub(crate) scene: Scene,
     pub(crate) renderer: Renderer,
@@ -61,24 +60,27 @@ pub(crate) struct Drawn<T> {
 }
 
 impl Stage {
-    /// Opens a `.glod` file and the graphics device.
-    pub(crate) fn open(file: &Path, budgets: Budgets) -> Result<Self, CliError> {
-        let splats: SplatFile = files::open_splats(file)?;
-        let up = splats.skeleton().root().up;
+    /// Puts everything in its place, and opens the graphics device.
+    pub(crate) fn open(subject: &Subject, budgets: Budgets) -> Result<Self, CliError> {
+        let up = subject.up();
         let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get()).min(4);
         let loader = ThreadedLoader::new(threads)
             .map_err(|error| CliError::new(format!("could not start loading threads: {error}")))?;
         let mut residency = Residency::new(budgets.cpu, Box::new(loader));
-        let id = residency.add(Arc::new(splats));
+        let ids: Vec<FileId> = subject.models.iter().map(|(file, _)| residency.add(file.clone())).collect();
         let mut scene = Scene::new(residency);
         scene.set_cpu_budget(budgets.cpu);
-        scene.add(Instance { file: id, placement: Similarity::IDENTITY });
+        for (file, (_, places)) in ids.into_iter().zip(&subject.models) {
+            for placement in places.iter().copied() {
+                scene.add(Instance { file, placement });
+            }
+        }
         let mut renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
         renderer.set_budget(budgets.gpu);
         Ok(Self { scene, renderer, up, most_splats: u64::MAX, happened: Vec::new() })
     }
 
-    /// Around the model.
+    /// Around all models.
     pub(crate) fn bounds(&self) -> Aabb {
         self.scene.bounds()
     }
@@ -161,11 +163,13 @@ impl DrawArgs {
         if self.full { 0.0 } else { self.error.unwrap_or(1.0) }
     }
 
-    pub(crate) fn look(&self) -> Look {
-        Look {
-            kernel: self.kernel.into(),
-            lighting: Lighting { towards_light: self.light, background: self.background },
-        }
+    /// As asked for; what is not asked for, as the scene has it.
+    pub(crate) fn look(&self, scene: &SceneDescription) -> Look {
+        let lighting = Lighting {
+            towards_light: self.light.or(scene.towards_light()),
+            background: self.background.or(scene.background).unwrap_or(Lighting::default().background),
+        };
+        Look { kernel: self.kernel.into(), lighting }
     }
 
     pub(crate) fn budgets(&self) -> Budgets {
@@ -177,7 +181,7 @@ impl DrawArgs {
     }
 }
 
-fn graphics_error(error: RenderError) -> CliError {
+pub(crate) fn graphics_error(error: RenderError) -> CliError {
     let error_line = CliError::new(&error);
     match error {
         RenderError::NoAdapter(_) => {

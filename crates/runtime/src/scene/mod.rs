@@ -1,9 +1,10 @@
 //! Instances of models, and the frame that brings selectors and residency together.
 
 mod budget;
+pub mod description;
 
 use crate::residency::{FileId, PageRequest, Residency};
-use crate::selection::{Selection, Target};
+use crate::selection::{Selection, Selector, Target};
 use crate::splats::ThresholdSearch;
 use crate::{CutReport, Fineness, InstanceId, Interrupt, Similarity, SplatSelector, ViewId};
 use gigalod_geom::{Aabb, Camera};
@@ -66,6 +67,19 @@ impl Scene {
         let id = InstanceId(self.instances.last_key_value().map_or(0, |(last, _)| last.0 + 1));
         self.instances.insert(id, instance);
         id
+    }
+
+    /// Takes a model out of the scene; what is resident of it goes when room is wanted.
+    pub fn remove(&mut self, instance: InstanceId) {
+        self.instances.remove(&instance);
+        let gone: Vec<Target> = self.lists.keys().copied().filter(|target| target.instance == instance).collect();
+        for target in gone {
+            if let Some(mut lists) = self.lists.remove(&target) {
+                self.splats.take_back(lists.shown.splats_mut());
+                self.splats.take_back(lists.next.splats_mut());
+            }
+            self.splats.forget(target);
+        }
     }
 
     /// How the splat hierarchies are cut.

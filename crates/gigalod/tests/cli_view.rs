@@ -1,0 +1,276 @@
+//! `gigalod view` as a person uses it: a real window on a virtual X server, moved by a hand of its own.
+//!
+//! Needs Xvfb and xdotool; without them the tests are skipped and say so, unless `REQUIRE_GPU` is set.
+#![cfg(all(feature = "view", target_os = "linux"))]
+
+mod cli_support;
+
+use cli_support::{Ran, command, folder, shape, statue};
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A virtual screen, of this many pixels.
+struct Screen {
+    server: Child,
+    display: String,
+    framebuffer: tempfile::TempDir,
+    /// Windows compete for the machine: one at a time.
+    _turn: MutexGuard<'static, ()>,
+}
+
+const WIDTH: usize = 900;
+const HEIGHT: usize = 600;
+
+/// Where the picture is, left of the panel.
+const MIDDLE: [i32; 2] = [300, 300];
+
+impl Screen {
+    fn open() -> Option<Self> {
+        static TURN: Mutex<()> = Mutex::new(());
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let framebuffer = tempfile::tempdir().unwrap();
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", &format!("{WIDTH}x{HEIGHT}x24"), "-nolisten", "tcp", "-fbdir"])
+            .arg(framebuffer.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let has_hand =
+            Command::new("xdotool").arg("version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
+        let (Ok(mut server), true) = (server, has_hand) else {
+            assert!(std::env::var_os("REQUIRE_GPU").is_none(), "REQUIRE_GPU is set, but Xvfb or xdotool is missing");
+            println!("skipped: Xvfb or xdotool is missing");
+            return None;
+        };
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        Some(Self { server, display: format!(":{}", number.trim()), framebuffer, _turn: turn })
+    }
+
+    /// Opens the viewer and waits for its window.
+    fn view<A: AsRef<OsStr>>(&self, folder: &Path, arguments: impl IntoIterator<Item = A>) -> Viewing<'_> {
+        let child = command()
+            .args(["view", "--json", "--size", &format!("{WIDTH}x{HEIGHT}")])
+            .args(arguments)
+            .env("DISPLAY", &self.display)
+            .env_remove("WAYLAND_DISPLAY")
+            .current_dir(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let viewing = Viewing { screen: self, child: Some(child), folder: folder.to_owned() };
+        viewing.hand(&["search", "--sync", "--name", "^Gigalod$", "windowfocus"]);
+        viewing
+    }
+
+    /// Colours on the screen, row by row: 8-bit red, green, blue.
+    fn pixels(&self) -> Vec<[u8; 3]> {
+        // An X window dump: a header of big-endian words, colours, then rows of 32-bit pixels.
+        let dump = std::fs::read(self.framebuffer.path().join("Xvfb_screen0")).unwrap();
+        let word = |at: usize| u32::from_be_bytes(dump[4 * at..4 * at + 4].try_into().unwrap()) as usize;
+        let (header, row, colors) = (word(0), word(12), word(19));
+        let begin = header + colors * 12;
+        let pixel = |x: usize, y: usize| {
+            let at = begin + y * row + 4 * x;
+            [dump[at + 2], dump[at + 1], dump[at]]
+        };
+        (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect()
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// A running viewer.
+struct Viewing<'a> {
+    screen: &'a Screen,
+    child: Option<Child>,
+    folder: PathBuf,
+}
+
+impl Viewing<'_> {
+    fn hand(&self, arguments: &[&str]) {
+        let status = Command::new("xdotool")
+            .args(arguments)
+            .env("DISPLAY", &self.screen.display)
+            .stdout(Stdio::null())
+            .status()
+            .unwrap();
+        assert!(status.success(), "xdotool {arguments:?}");
+    }
+
+    fn presses(&self, key: &str) {
+        self.hand(&["key", key]);
+    }
+
+    fn drags(&self, from: [i32; 2], by: [i32; 2], button: &str) {
+        let text = |at: [i32; 2]| at.map(|x| x.to_string());
+        let [x, y] = text(from);
+        self.hand(&["mousemove", &x, &y, "sleep", "0.3", "mousedown", button]);
+        for step in 1..=4 {
+            let [x, y] = text([from[0] + by[0] * step / 4, from[1] + by[1] * step / 4]);
+            self.hand(&["sleep", "0.1", "mousemove", &x, &y]);
+        }
+        self.hand(&["sleep", "0.3", "mouseup", button]);
+    }
+
+    fn clicks(&self, [x, y]: [i32; 2]) {
+        self.hand(&["mousemove", &x.to_string(), &y.to_string(), "sleep", "0.1", "click", "1"]);
+    }
+
+    /// Takes a picture, which is there when nothing gets finer any more.
+    fn takes_picture(&self, name: &str) -> PathBuf {
+        self.presses("p");
+        let path = self.folder.join(name);
+        waits_until(|| path.is_file());
+        path
+    }
+
+    /// The first picture of a model that has to be built: until then there is nothing to take.
+    fn takes_picture_when_built(&self) -> PathBuf {
+        let path = self.folder.join("statue-1.png");
+        waits_until(|| {
+            self.presses("p");
+            std::thread::sleep(Duration::from_millis(300));
+            path.is_file()
+        });
+        path
+    }
+
+    /// Closes the window; the figures.
+    fn closes(mut self) -> Value {
+        self.presses("ctrl+q");
+        Ran::of(self.child.take().unwrap().wait_with_output().unwrap()).done().json()
+    }
+}
+
+impl Drop for Viewing<'_> {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.child.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// At most two minutes, which is a failure.
+#[track_caller]
+fn waits_until(is_so: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < Duration::from_secs(120), "it never came to be so");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn read_png(path: &Path) -> (usize, Vec<[u8; 3]>) {
+    let decoder = png::Decoder::new(BufReader::new(std::fs::File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    (info.width as usize, bytes.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect())
+}
+
+fn numbers(value: &Value) -> String {
+    value.as_array().unwrap().iter().map(Value::to_string).collect::<Vec<_>>().join(",")
+}
+
+#[test]
+fn a_rested_picture_is_that_of_render_on_the_screen_and_in_a_file() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    let viewing = screen.view(place.path(), [&statue().glod]);
+    let first = viewing.takes_picture("statue-1.png");
+    viewing.presses("F2");
+    viewing.drags(MIDDLE, [150, 60], "1");
+    viewing.hand(&["mousemove", "320", "250", "click", "4", "sleep", "0.2", "click", "4"]);
+    viewing.drags(MIDDLE, [30, -20], "3");
+    let second = viewing.takes_picture("statue-2.png");
+    let (width, shown) = read_png(&second);
+    assert_eq!(width, WIDTH);
+    assert_ne!(shown, read_png(&first).1, "the camera moved");
+    // Nothing but the picture: notices have gone by then.
+    waits_until(|| screen.pixels() == shown);
+    let figures = viewing.closes();
+    assert_eq!(figures["problems"], Value::Array(Vec::new()));
+    let drawn = place.path().join("drawn.png");
+    let fov = figures["fov"].to_string();
+    let (eye, target) = (numbers(&figures["eye"]), numbers(&figures["target"]));
+    let size = format!("{WIDTH}x{HEIGHT}");
+    run!["render", statue().glod, "-o", drawn, "--eye", eye, "--target", target, "--fov", fov, "--size", size].done();
+    assert!(std::fs::read(&drawn).unwrap() == std::fs::read(&second).unwrap(), "the same bytes");
+    assert!(figures["settled"] == Value::Bool(true) && figures["threshold_px"] == 1.0, "{figures}");
+    assert_eq!(
+        shape(&figures),
+        "{adapter bytes_read driver_cpu_ms{max median p99} eye[] first_frame_ms fov frames height input_to_frame_ms{max median p99} limited_by \
+         max_error_px measured problems[] rest_to_settled_ms settled splats stage_cpu_ms{max median p99} target[] \
+         threshold_px up[] width window_cpu_ms{max median p99} written[]}"
+    );
+}
+
+#[test]
+fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    let viewing = screen.view(place.path(), [&statue().ply]);
+    let _ = viewing.takes_picture_when_built();
+    viewing.presses("m");
+    let clicked = [[430, 200], [480, 420]];
+    clicked.iter().for_each(|at| viewing.clicks(*at));
+    std::thread::sleep(Duration::from_secs(2));
+    let figures = viewing.closes();
+    let measured = &figures["measured"];
+    assert_eq!(measured["uncertain"], 0.0, "{figures}");
+    let vector = |value: &Value| glam::DVec3::from_array([0, 1, 2].map(|at| value[at].as_f64().unwrap()));
+    let mut stream = gigalod::import::open(Box::new(std::fs::File::open(&statue().ply).unwrap())).unwrap();
+    let batch = gigalod::import::read_all(&mut *stream, &mut |_, _| {}).unwrap();
+    let mesh = gigalod::verify::mesh_of(batch).unwrap();
+    let bvh = gigalod_reference::Bvh::build(&mesh);
+    let camera = gigalod::geom::Camera::look_at(
+        vector(&figures["eye"]),
+        vector(&figures["target"]),
+        vector(&figures["up"]),
+        figures["fov"].as_f64().unwrap().to_radians(),
+        gigalod::geom::ImageSize { width: WIDTH as u32, height: HEIGHT as u32 },
+    );
+    for (point, [x, y]) in measured["points"].as_array().unwrap().iter().zip(clicked) {
+        let direction = camera.ray_through(glam::DVec2::new(f64::from(x), f64::from(y)));
+        let ray = gigalod_reference::triangle::Ray { origin: camera.eye, direction };
+        let truth = bvh.first_hit(&ray).expect("the statue is there");
+        let error = (vector(point) - (camera.eye + direction * truth.t)).length() / mesh.bounds().diagonal();
+        assert!(error < 1e-6, "{error} of the diagonal");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_told_in_the_window_and_a_window_that_cannot_be_is_an_error() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    std::fs::write(place.path().join("scene.toml"), "[[model]]\nfile = \"none.glod\"\n").unwrap();
+    std::fs::write(place.path().join("broken.toml"), "up = 3\n").unwrap();
+    let viewing = screen.view(place.path(), ["scene.toml", "broken.toml", "nothing.ply"]);
+    // All three are told in red.
+    let red = || screen.pixels().iter().filter(|[r, g, b]| *r > 90 && *g < 50 && *b < 50).count();
+    waits_until(|| red() > 3000);
+    let figures = viewing.closes();
+    let problems: Vec<&str> =
+        figures["problems"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
+    assert_eq!(problems.len(), 3, "{problems:?}");
+    assert!(problems.iter().any(|problem| problem.starts_with("broken.toml: ") && problem.ends_with("(line 1)")));
+    assert!(problems.iter().any(|problem| problem.starts_with("nothing.ply: ")));
+
+    let ran = command().args(["view", "--json"]).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap();
+    let ran = Ran::of(ran);
+    assert_eq!(ran.status, 1, "{ran:?}");
+    assert!(ran.stderr.starts_with("error: could not open a window: "), "{ran:?}");
+}

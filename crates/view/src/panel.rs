@@ -1,0 +1,324 @@
+//! The panel: what can be chosen, and what is going on.
+
+use crate::mailbox::ModelKey;
+use crate::measure::digits;
+use crate::navigation::Input;
+use crate::viewer::{Staged, Viewer};
+use egui::{CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, vec2};
+use gigalod_render::Kernel;
+use gigalod_runtime::Limit;
+use gigalod_runtime::scene::description::{Light, LightKind, Places, SceneCamera, SceneDescription, SceneModel};
+use gigalod_runtime::splats::Tint;
+use std::path::PathBuf;
+
+/// Points.
+const WIDTH: f32 = 320.0;
+
+impl Viewer {
+    pub(crate) fn panel(&mut self, ui: &mut Ui, now: f64) {
+        let frame = egui::Frame::side_top_panel(ui.style()).inner_margin(10.0);
+        Panel::right("panel").exact_size(WIDTH).resizable(false).frame(frame).show(ui, |ui| {
+            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                self.models_section(ui, now);
+                section(ui, "Picture", |ui| self.picture_section(ui));
+                section(ui, "Measure", |ui| self.measure_section(ui));
+                section(ui, "Camera path", |ui| self.path_section(ui, now));
+                section(ui, "Save", |ui| self.save_section(ui, now));
+                section(ui, "Figures", |ui| self.figures_section(ui));
+            });
+        });
+    }
+
+    fn models_section(&mut self, ui: &mut Ui, now: f64) {
+        ui.add_space(6.0);
+        ui.horizontal(|ui| {
+            ui.heading("Gigalod");
+            if ui.button("Home").on_hover_text("Look at everything (Home)").clicked() {
+                self.steer(&Input::Home, now);
+            }
+            ui.toggle_value(&mut self.shows_help, "Keys (F1)");
+            ui.weak("F2 hides this");
+        });
+        let mut removed: Option<ModelKey> = None;
+        for Staged { key, model } in &self.models {
+            ui.horizontal(|ui| {
+                if ui.small_button("x").on_hover_text("Take this model away").clicked() {
+                    removed = Some(*key);
+                }
+                let leaves = model.file.skeleton().root().leaves;
+                let name = model.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                let text = format!("{name}, {} splats", count(leaves));
+                ui.add(egui::Label::new(text).truncate()).on_hover_text(model.source.display().to_string());
+            });
+        }
+        if let Some(key) = removed {
+            self.remove(key);
+        }
+    }
+
+    fn picture_section(&mut self, ui: &mut Ui) {
+        let settings = &mut self.settings;
+        Grid::new("picture").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
+            let label = ui.label("Error at rest").on_hover_text("Largest error on screen that is wanted");
+            let slider = Slider::new(&mut settings.finest_px, 0.25..=32.0).logarithmic(true).suffix(" px");
+            ui.add(slider).labelled_by(label.id);
+            ui.end_row();
+            let label = ui.label("Frame time").on_hover_text("How long a frame may take while the camera moves");
+            let slider = Slider::new(&mut settings.target_ms, 8.0..=500.0).logarithmic(true).suffix(" ms");
+            ui.add(slider).labelled_by(label.id);
+            ui.end_row();
+            let label = ui.label("Kernel");
+            let chosen = egui::ComboBox::from_id_salt("kernel").selected_text(kernel_name(settings.kernel));
+            let list = chosen.show_ui(ui, |ui| {
+                for kernel in Kernel::ALL {
+                    ui.selectable_value(&mut settings.kernel, kernel, kernel_name(kernel));
+                }
+            });
+            list.response.labelled_by(label.id);
+            ui.end_row();
+            ui.label("Colours");
+            ui.horizontal(|ui| {
+                ui.selectable_value(&mut settings.tint, Tint::Model, "model");
+                ui.selectable_value(&mut settings.tint, Tint::Level, "levels");
+            });
+            ui.end_row();
+            let label = ui.label("Background");
+            ui.color_edit_button_srgb(&mut settings.background).labelled_by(label.id);
+            ui.end_row();
+            ui.label("Light").on_hover_text("Drag in the picture with Ctrl held down");
+            ui.horizontal(|ui| match settings.towards_light {
+                None => {
+                    ui.weak("at the shoulder; Ctrl+drag");
+                }
+                Some(towards) => {
+                    ui.label(format!("{:.2} {:.2} {:.2}", towards.x, towards.y, towards.z));
+                    if ui.small_button("reset").clicked() {
+                        settings.towards_light = None;
+                    }
+                }
+            });
+            ui.end_row();
+            ui.label("Memory").on_hover_text("Most memory for decoded pages and lists");
+            mebibytes(ui, &mut settings.cpu_budget);
+            ui.end_row();
+            ui.label("Device memory").on_hover_text("Most memory on the graphics device");
+            ui.horizontal(|ui| {
+                let mut is_limited = settings.gpu_budget.is_some();
+                if ui.checkbox(&mut is_limited, "at most").changed() {
+                    settings.gpu_budget = is_limited.then_some(1 << 30);
+                }
+                if let Some(budget) = &mut settings.gpu_budget {
+                    mebibytes(ui, budget);
+                }
+            });
+            ui.end_row();
+        });
+    }
+
+    fn figures_section(&mut self, ui: &mut Ui) {
+        self.plot(ui);
+        let figures = &self.figures;
+        let report = &figures.report;
+        let error = if report.max_error_px.is_finite() {
+            format!("{:.2} px", report.max_error_px)
+        } else {
+            "around the eye".to_string()
+        };
+        let limit = match (report.limited_by, figures.settled) {
+            (Some(Limit::Data), true) => "as fine as the data",
+            (Some(Limit::Data), false) => "limited by the data",
+            (Some(Limit::Residency), _) => "limited by residency: loading",
+            (Some(Limit::Budget), _) => "limited by a budget",
+            (None, true) => "as fine as asked for",
+            (None, false) => "being refined",
+        };
+        Grid::new("figures").num_columns(2).spacing([8.0, 2.0]).show(ui, |ui| {
+            let mut row = |name: &str, value: String| {
+                ui.label(name);
+                ui.monospace(value);
+                ui.end_row();
+            };
+            row("frame", format!("{:.0} ms, {:.0} to select", figures.frame_ms, figures.select_ms));
+            row("error on screen", error);
+            row("", limit.to_string());
+            row("threshold", format!("{:.2} px", report.threshold_px));
+            row("splats drawn", count(report.drawn));
+            row("nodes visited", count(report.visited));
+            row("page misses", count(figures.misses));
+            row("pages resident", bytes(figures.resident_bytes));
+            row("memory", bytes(figures.cpu_bytes));
+            row("device memory", bytes(figures.gpu_bytes));
+            row("read", bytes(figures.bytes_read));
+            row("window", format!("{}x{}", self.size.width, self.size.height));
+        });
+        ui.add(egui::Label::new(egui::RichText::new(&self.adapter).weak()).truncate());
+    }
+
+    /// Times of the last frames, with the one aimed at.
+    fn plot(&self, ui: &mut Ui) {
+        let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 56.0), Sense::hover());
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 3.0, ui.visuals().extreme_bg_color);
+        let target = self.settings.target_ms as f32;
+        let most = self.frame_times.iter().copied().fold(target * 1.5, f32::max);
+        let y = |ms: f32| rect.bottom() - rect.height() * (ms / most).min(1.0);
+        let width = rect.width() / 200.0;
+        for (at, ms) in self.frame_times.iter().enumerate() {
+            let left = rect.left() + at as f32 * width;
+            let color =
+                if *ms > target * 1.5 { Color32::from_rgb(230, 140, 70) } else { Color32::from_rgb(110, 170, 230) };
+            let bar = egui::Rect::from_min_max(egui::pos2(left, y(*ms)), egui::pos2(left + width, rect.bottom()));
+            painter.rect_filled(bar, 0.0, color);
+        }
+        painter.hline(rect.x_range(), y(target), Stroke::new(1.0, ui.visuals().weak_text_color()));
+        let label = format!("{most:.0} ms");
+        let font = egui::FontId::proportional(10.0);
+        painter.text(rect.left_top() + vec2(3.0, 2.0), egui::Align2::LEFT_TOP, label, font, ui.visuals().text_color());
+    }
+
+    fn measure_section(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.toggle_value(&mut self.measuring.is_on, "Pick points (M)");
+            if ui.button("Clear").clicked() {
+                self.measuring.clear();
+            }
+        });
+        let mut is_empty = true;
+        for found in self.measuring.points() {
+            is_empty = false;
+            let point = found.point.to_array().map(|x| digits(x, found.uncertain)).join("  ");
+            ui.add(egui::Label::new(egui::RichText::new(point).monospace()).truncate());
+        }
+        if is_empty && self.measuring.is_on {
+            ui.weak("Click two points of the surface.");
+        }
+        if let Some((distance, uncertain, to_come)) = self.measuring.distance() {
+            ui.strong(format!("Distance {}", digits(distance, uncertain)));
+            if to_come {
+                ui.weak(format!("± {uncertain:.2e}; reading the original"));
+            } else if uncertain > 0.0 {
+                ui.weak(format!("± {uncertain:.2e}, from the splats"));
+            } else {
+                ui.weak("exact, from the original");
+            }
+        }
+    }
+
+    fn path_section(&mut self, ui: &mut Ui, now: f64) {
+        ui.horizontal(|ui| {
+            let text = if self.recorder.is_recording() { "Stop (R)" } else { "Record (R)" };
+            if ui.button(text).clicked() {
+                self.toggle_recording(now);
+            }
+            let text = if self.recorder.is_playing() { "Stop playing" } else { "Play (Space)" };
+            if ui.add_enabled(self.recorder.path().is_some(), egui::Button::new(text)).clicked() {
+                self.toggle_playing(now);
+            }
+        });
+        if let Some(path) = self.recorder.path() {
+            let seconds =
+                path.frames.last().map_or(0.0, |pose| pose.t) - path.frames.first().map_or(0.0, |pose| pose.t);
+            ui.weak(format!("{} poses, {seconds:.1} s", path.frames.len()));
+        }
+    }
+
+    fn save_section(&mut self, ui: &mut Ui, now: f64) {
+        Grid::new("save").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
+            let mut row = |text: &str, name: &mut String, is_enabled: bool| {
+                let button = ui.add_enabled(is_enabled, egui::Button::new(text));
+                ui.add(TextEdit::singleline(name).desired_width(180.0)).labelled_by(button.id);
+                ui.end_row();
+                button.clicked()
+            };
+            let picture = row("Picture (P)", &mut self.names.picture, !self.models.is_empty());
+            let path = row("Path", &mut self.names.path, self.recorder.path().is_some());
+            let scene = row("Scene", &mut self.names.scene, !self.models.is_empty());
+            if picture {
+                self.take_picture(now);
+            }
+            if path && let Some(path) = self.recorder.path() {
+                self.jobs.write_path(PathBuf::from(&self.names.path), path.clone());
+            }
+            if scene {
+                self.jobs.write_scene(PathBuf::from(&self.names.scene), self.scene());
+            }
+        });
+    }
+
+    /// What is shown, as a scene.
+    pub(crate) fn scene(&self) -> SceneDescription {
+        let at = self.own_viewpoint();
+        let light = self.settings.towards_light.map(|towards| Light {
+            kind: LightKind::Directional { towards },
+            size: 0.0,
+            color: [255; 3],
+            intensity: 1.0,
+        });
+        let models = self.models.iter().flat_map(|Staged { model, .. }| {
+            let one = |place: &gigalod_runtime::Similarity| SceneModel {
+                file: model.source.clone(),
+                places: Places::One(*place),
+            };
+            model.placements.iter().map(one).collect::<Vec<_>>()
+        });
+        SceneDescription {
+            up: Some(self.up()),
+            background: Some(self.settings.background),
+            camera: Some(SceneCamera {
+                eye: Some(at.eye),
+                target: Some(at.target),
+                up: Some(at.up),
+                fov_deg: Some(at.fov_deg),
+            }),
+            ground: None,
+            models: models.collect(),
+            lights: light.into_iter().collect(),
+        }
+    }
+}
+
+fn section(ui: &mut Ui, name: &str, contents: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(name).default_open(true).show(ui, contents);
+}
+
+fn mebibytes(ui: &mut Ui, bytes: &mut u64) {
+    let mut mebibytes = *bytes >> 20;
+    let value = DragValue::new(&mut mebibytes).range(16..=1 << 20).speed(8.0).suffix(" MiB");
+    if ui.add(value).changed() {
+        *bytes = mebibytes << 20;
+    }
+}
+
+fn kernel_name(kernel: Kernel) -> &'static str {
+    match kernel {
+        Kernel::Square => "square",
+        Kernel::Round => "round",
+        Kernel::Gauss => "Gaussian",
+        Kernel::SquareEllipse => "square, elliptical",
+        Kernel::RoundEllipse => "round, elliptical",
+        Kernel::GaussEllipse => "Gaussian, elliptical",
+        _ => "another",
+    }
+}
+
+/// With a thin space between thousands.
+pub(crate) fn count(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+fn bytes(number: u64) -> String {
+    match number {
+        0..1024 => format!("{number} B"),
+        1024..1_048_576 => format!("{:.1} KiB", number as f64 / 1024.0),
+        1_048_576..1_073_741_824 => format!("{:.1} MiB", number as f64 / 1_048_576.0),
+        _ => format!("{:.2} GiB", number as f64 / 1_073_741_824.0),
+    }
+}

@@ -1,0 +1,79 @@
+//! What a person chooses.
+
+use gigalod_geom::ImageSize;
+use gigalod_render::{Kernel, Lighting, Look};
+use gigalod_runtime::splats::Tint;
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// How things are drawn, and with what.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Shape of splats.
+    pub kernel: Kernel,
+    /// World space; `None` for a lamp at the viewer's shoulder.
+    pub towards_light: Option<DVec3>,
+    /// 8-bit sRGB.
+    pub background: [u8; 3],
+    /// Colours of the model, or one for each level of detail.
+    pub tint: Tint,
+    /// Error at rest, in pixels.
+    pub finest_px: f32,
+    /// Milliseconds of a frame while the camera moves.
+    pub target_ms: f64,
+    /// Bytes for pages and lists.
+    pub cpu_budget: u64,
+    /// Bytes on the graphics device; `None` for all there is.
+    pub gpu_budget: Option<u64>,
+}
+
+impl Settings {
+    pub(crate) fn look(&self) -> Look {
+        let lighting = Lighting { towards_light: self.towards_light, background: self.background };
+        Look { kernel: self.kernel, lighting }
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            kernel: Kernel::Round,
+            towards_light: None,
+            background: [32, 32, 36],
+            tint: Tint::Model,
+            finest_px: 1.0,
+            target_ms: 50.0,
+            cpu_budget: 1 << 30,
+            gpu_budget: None,
+        }
+    }
+}
+
+/// Where the first look is from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FirstLook {
+    /// Azimuth and elevation in degrees, and how many times nearer than a view of the whole.
+    Orbit([f64; 3]),
+    /// World space.
+    From {
+        /// Where the eye is.
+        eye: DVec3,
+        /// What it looks at.
+        target: DVec3,
+    },
+}
+
+/// How the viewer begins.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Models, scenes, folders or camera paths.
+    pub files: Vec<PathBuf>,
+    /// How things are drawn.
+    pub settings: Settings,
+    /// Vertical field of view, in degrees.
+    pub fov_deg: f64,
+    /// Where the first look is from.
+    pub first_look: FirstLook,
+    /// Of the window's content, in physical pixels.
+    pub size: ImageSize,
+}

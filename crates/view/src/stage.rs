@@ -1,0 +1,252 @@
+//! The thread that selects, uploads and draws, so that the window's thread never does.
+//!
+//! Goes in: wishes and orders. Comes out: pictures on the device, and figures. While wishes change, each frame is as fine as its
+//! time allows; once they rest it is refined step by step, until a new wish comes: that breaks a cut off at once.
+//!
+//! What always holds: a rested picture is that of `render` for the same camera, look and budgets, bit for bit; what goes wrong with
+//! files or the device is told and survived.
+
+use crate::clock::thread_cpu_ms;
+use crate::mailbox::{Figures, Mail, Mailbox, ModelKey, News, Order, Wish};
+use crate::settings::Settings;
+use gigalod_render::{Frame, RenderError, Renderer};
+use gigalod_runtime::residency::ThreadedLoader;
+use gigalod_runtime::{CutReport, Fineness, FrameRate, Instance, InstanceId, Residency, Scene, ViewId};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+const CAMERA: ViewId = ViewId(0);
+
+/// Where there is no memory for so few, coarser will not help.
+const FEWEST_SPLATS: u64 = 1000;
+
+/// How often pages that are being loaded are looked for, while there is nothing else to do.
+const LOOK_FOR_PAGES: Duration = Duration::from_millis(4);
+
+pub(crate) struct Stage {
+    mailbox: Arc<Mailbox>,
+    renderer: Renderer,
+    scene: Scene,
+    instances: BTreeMap<ModelKey, Vec<InstanceId>>,
+    control: FrameRate,
+    wish: Option<(u64, Wish)>,
+    /// What the last finished frame shows.
+    drawn: Option<(Wish, CutReport)>,
+    /// The next frame shows something else than the last one.
+    changed: bool,
+    /// Drawing is in vain until something changes.
+    stuck: bool,
+    /// The device is gone.
+    lost: bool,
+    /// What a device without enough memory has left.
+    most_splats: u64,
+    pictures: Vec<PathBuf>,
+    frames: u64,
+}
+
+impl Stage {
+    pub(crate) fn new(mailbox: Arc<Mailbox>, mut renderer: Renderer, settings: Settings) -> std::io::Result<Self> {
+        let threads = std::thread::available_parallelism().map_or(1, |cores| cores.get()).min(4);
+        let residency = Residency::new(settings.cpu_budget, Box::new(ThreadedLoader::new(threads)?));
+        let mut scene = Scene::new(residency);
+        scene.set_cpu_budget(settings.cpu_budget);
+        renderer.set_budget(settings.gpu_budget);
+        Ok(Self {
+            mailbox,
+            renderer,
+            scene,
+            instances: BTreeMap::new(),
+            control: FrameRate::new(settings.target_ms, settings.finest_px),
+            wish: None,
+            drawn: None,
+            changed: true,
+            stuck: false,
+            lost: false,
+            most_splats: u64::MAX,
+            pictures: Vec::new(),
+            frames: 0,
+        })
+    }
+
+    /// Until the mailbox is closed.
+    pub(crate) fn run(mut self) {
+        loop {
+            let rests = self.wish.is_none() || self.lost || self.stuck || !self.changed && self.control.is_settled();
+            let wait = if rests {
+                // What was ordered of a finished picture can be had now.
+                self.take_pictures();
+                None
+            } else if !self.changed && self.waits_for_pages() {
+                Some(LOOK_FOR_PAGES)
+            } else {
+                Some(Duration::ZERO)
+            };
+            let Mail { wish, orders, closed } = self.mailbox.receive(wait);
+            if closed {
+                return;
+            }
+            if let Some((number, wish)) = wish {
+                self.take_wish(number, wish);
+            }
+            for order in orders {
+                self.obey(order);
+            }
+            let Some((number, wish)) = self.wish else { continue };
+            if self.lost || self.stuck || !self.changed && self.control.is_settled() {
+                continue;
+            }
+            if !self.changed && self.waits_for_pages() && self.scene.residency_mut().receive(false) == 0 {
+                continue;
+            }
+            self.frame(number, &wish);
+        }
+    }
+
+    /// True where the last frame was as fine as resident pages allow, and others are on their way.
+    fn waits_for_pages(&self) -> bool {
+        let finest = self.drawn.as_ref().is_some_and(|(wish, report)| report.threshold_px <= wish.finest_px);
+        finest && self.scene.residency().is_loading()
+    }
+
+    fn take_wish(&mut self, number: u64, wish: Wish) {
+        let before = self.wish.replace((number, wish)).map(|(_, before)| before);
+        if before == Some(wish) {
+            return;
+        }
+        // Before it is gone.
+        self.take_pictures();
+        if before.is_none_or(|before| before.target_ms != wish.target_ms || before.finest_px != wish.finest_px) {
+            self.control = FrameRate::new(wish.target_ms, wish.finest_px);
+        }
+        if before.is_none_or(|before| before.cpu_budget != wish.cpu_budget) {
+            self.scene.set_cpu_budget(wish.cpu_budget);
+        }
+        if before.is_none_or(|before| before.gpu_budget != wish.gpu_budget) {
+            self.renderer.set_budget(wish.gpu_budget);
+            self.most_splats = u64::MAX;
+        }
+        self.scene.splats_mut().tint = wish.tint;
+        (self.changed, self.stuck) = (true, false);
+    }
+
+    fn obey(&mut self, order: Order) {
+        match order {
+            Order::Add(key, file, placements) => {
+                let file = self.scene.residency_mut().add(file);
+                let ids = placements.into_iter().map(|placement| self.scene.add(Instance { file, placement }));
+                self.instances.insert(key, ids.collect());
+            }
+            Order::Remove(key) => {
+                for id in self.instances.remove(&key).unwrap_or_default() {
+                    self.scene.remove(id);
+                }
+            }
+            Order::Picture(name) => {
+                self.pictures.push(name);
+                return;
+            }
+            Order::MoveTo(gpu) => match self.renderer.move_to(*gpu) {
+                Ok(()) => self.lost = false,
+                Err(error) => self.mailbox.tell(News::Problem(error.to_string())),
+            },
+        }
+        (self.changed, self.stuck) = (true, false);
+    }
+
+    fn frame(&mut self, number: u64, wish: &Wish) {
+        let (begun, cpu_begun) = (Instant::now(), thread_cpu_ms());
+        let moved = self.changed;
+        let wanted = self.control.next(moved);
+        let room = self.renderer.most_splats(wish.camera.size, wish.look.kernel);
+        let fineness = Fineness { most_splats: wanted.most_splats.min(self.most_splats).min(room), ..wanted };
+        self.scene.residency_mut().receive(false);
+        let report = if moved {
+            // A moving frame is short, and breaking it off would show nothing at all.
+            self.scene.select(CAMERA, &wish.camera, &fineness)
+        } else {
+            let interrupt = self.mailbox.interrupt().clone();
+            match self.scene.select_interruptible(CAMERA, &wish.camera, &fineness, &interrupt) {
+                Some(report) => report,
+                None => {
+                    self.scene.serve();
+                    return;
+                }
+            }
+        };
+        let select_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let misses = self.scene.draws(CAMERA).map(|(_, selection)| selection.requests.len() as u64).sum();
+        let draws =
+            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
+        let drawn = self.renderer.draw(&Frame { camera: wish.camera, look: wish.look, draws });
+        self.scene.serve();
+        if let Err(error) = drawn {
+            self.survive(error, &report);
+            return;
+        }
+        let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+        self.control.drew(frame_ms, &report, self.scene.residency().is_loading());
+        self.changed = false;
+        self.drawn = Some((*wish, report));
+        self.frames += 1;
+        let figures = Figures {
+            wish: number,
+            report,
+            frame_ms,
+            select_ms,
+            cpu_ms: thread_cpu_ms() - cpu_begun,
+            misses,
+            resident_bytes: self.scene.residency().resident_bytes(),
+            cpu_bytes: self.scene.cpu_bytes(),
+            gpu_bytes: self.renderer.gpu_bytes(),
+            bytes_read: self.scene.residency().bytes_read(),
+            settled: self.control.is_settled(),
+            frames: self.frames,
+            problems: self.problems(&report),
+        };
+        self.mailbox.show(self.renderer.shown(), figures);
+    }
+
+    fn survive(&mut self, error: RenderError, report: &CutReport) {
+        match error {
+            RenderError::DeviceLost(why) => {
+                self.lost = true;
+                self.mailbox.forget_shown();
+                self.mailbox.tell(News::DeviceLost(why));
+            }
+            RenderError::OutOfMemory(why) if report.drawn > FEWEST_SPLATS => {
+                self.most_splats = report.drawn / 2;
+                let text = format!("the graphics device is out of memory, drawn coarser: {why}");
+                self.mailbox.tell(News::Problem(text));
+            }
+            error => {
+                self.stuck = true;
+                self.mailbox.tell(News::Problem(error.to_string()));
+            }
+        }
+    }
+
+    /// Draws what is shown once more, for a file.
+    fn take_pictures(&mut self) {
+        let Some((wish, _)) = self.drawn.as_ref().filter(|_| !self.pictures.is_empty() && !self.lost) else { return };
+        let draws =
+            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
+        let picture = self.renderer.picture(&Frame { camera: wish.camera, look: wish.look, draws });
+        for name in std::mem::take(&mut self.pictures) {
+            self.mailbox.tell(match &picture {
+                Ok(picture) => News::Picture(name, picture.size, picture.rgba.clone()),
+                Err(error) => News::Problem(format!("{}: {error}", name.display())),
+            });
+        }
+    }
+
+    fn problems(&self, report: &CutReport) -> Vec<String> {
+        let damaged = self.scene.residency().damaged();
+        let mut problems: Vec<String> = damaged.map(|(_, why)| format!("drawn coarser: {why}")).collect();
+        if report.inconsistent {
+            problems.push("the tree of a file contradicts itself, parts may be missing".to_string());
+        }
+        problems
+    }
+}

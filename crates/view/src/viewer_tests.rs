@@ -1,0 +1,369 @@
+//! The user interface without a window: egui's own harness plays a person, a host in memory the files.
+
+use crate::host::{Host, Model, Opened, Work};
+use crate::mailbox::{Mailbox, Order};
+use crate::pick::{Hit, Ray};
+use crate::picker;
+use crate::settings::{FirstLook, Options, Settings};
+use crate::viewer::Viewer;
+use egui::{Event, Modifiers, MouseWheelUnit, PointerButton, Pos2, pos2, vec2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use gigalod_build::NoProgress;
+use gigalod_format::splats::SplatFile;
+use gigalod_format::{Container, FileStore};
+use gigalod_geom::{CameraPath, ImageSize};
+use gigalod_runtime::Similarity;
+use gigalod_runtime::scene::description::SceneDescription;
+use gigalod_synth::{Order as VertexOrder, StatueOptions};
+use glam::{DVec2, DVec3};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+const SIZE: ImageSize = ImageSize { width: 1000, height: 700 };
+
+/// Where the picture is, left of the panel.
+const MIDDLE: Pos2 = pos2(350.0, 350.0);
+
+/// One statue, whatever is asked for; and a list of what was written.
+struct Files {
+    statue: Model,
+    written: Mutex<Vec<(PathBuf, String)>>,
+}
+
+impl Files {
+    fn wrote(&self, path: &Path, what: String) -> Result<(), String> {
+        self.written.lock().unwrap().push((path.to_owned(), what));
+        Ok(())
+    }
+}
+
+impl Host for Files {
+    fn open(&self, path: &Path, _work: &Work) -> Result<Opened, String> {
+        match path.to_str() {
+            Some("statue.glod") => Ok(Opened::Model(self.statue.clone())),
+            Some("folder") => Ok(Opened::Folder(vec!["statue.glod".into(), "other.ply".into()])),
+            _ => Err(format!("{}: no such file", path.display())),
+        }
+    }
+
+    fn exact_point(&self, _: &Path, ray: &Ray, near: &Hit, _: &Work) -> Result<Option<DVec3>, String> {
+        Ok(Some(ray.origin + ray.direction * near.t))
+    }
+
+    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<(), String> {
+        self.wrote(path, format!("{}x{}, {} bytes", size.width, size.height, rgba.len()))
+    }
+
+    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<(), String> {
+        self.wrote(path, format!("{} poses", camera_path.frames.len()))
+    }
+
+    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<(), String> {
+        self.wrote(path, format!("{} models", scene.models.len()))
+    }
+}
+
+fn statue(folder: &Path) -> Arc<SplatFile> {
+    let scan = folder.join("statue.ply");
+    let options = StatueOptions { triangles: 20_000, seed: 3, colors: false, order: VertexOrder::Coherent };
+    let mut out = std::fs::File::create(&scan).unwrap();
+    gigalod_synth::write_statue(options, &mut out, &mut |_, _| {}).unwrap();
+    let stream = gigalod_import::open(Box::new(std::fs::File::open(&scan).unwrap())).unwrap();
+    let built = folder.join("statue.glod");
+    gigalod_build::splats::build(stream, &Default::default(), &NoProgress, &built).unwrap();
+    let container = Container::open(Arc::new(FileStore::open(&built).unwrap())).unwrap();
+    Arc::new(SplatFile::open(container).unwrap())
+}
+
+/// A viewer that has opened `files`, and what it writes.
+struct Person {
+    harness: Harness<'static, Viewer>,
+    files: Arc<Files>,
+    _folder: tempfile::TempDir,
+}
+
+impl Person {
+    fn opens(names: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let statue = Model {
+            source: "statue.glod".into(),
+            file: statue(folder.path()),
+            original: None,
+            placements: vec![Similarity::IDENTITY],
+        };
+        let files = Arc::new(Files { statue, written: Mutex::default() });
+        let options = Options {
+            files: names.iter().map(PathBuf::from).collect(),
+            settings: Settings::default(),
+            fov_deg: 40.0,
+            first_look: FirstLook::Orbit([0.0, 0.0, 1.0]),
+            size: SIZE,
+        };
+        let mailbox = Arc::new(Mailbox::new(|| {}));
+        let picker = picker::start(files.clone(), || {}).unwrap();
+        let viewer = Viewer::new(&options, files.clone(), mailbox, picker, || {});
+        let mut harness = Harness::builder()
+            .with_size(vec2(SIZE.width as f32, SIZE.height as f32))
+            .with_step_dt(1.0 / 60.0)
+            .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui, SIZE), viewer);
+        harness.run_steps(2);
+        let mut person = Self { harness, files, _folder: folder };
+        person.waits_until(|viewer| viewer.jobs.running().is_empty());
+        person
+    }
+
+    fn viewer(&mut self) -> &mut Viewer {
+        self.harness.state_mut()
+    }
+
+    /// Frames until something is so; at most a minute, which is a failure.
+    fn waits_until(&mut self, is_so: impl Fn(&Viewer) -> bool) {
+        let begun = Instant::now();
+        loop {
+            self.harness.run_steps(1);
+            if is_so(self.harness.state()) {
+                self.harness.run_steps(1);
+                return;
+            }
+            assert!(begun.elapsed() < Duration::from_secs(60), "it never came to be so");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn event(&mut self, event: Event) {
+        self.harness.event(event);
+        self.harness.run_steps(1);
+    }
+
+    fn button(&mut self, pos: Pos2, button: PointerButton, pressed: bool, modifiers: Modifiers) {
+        self.harness.event(Event::PointerMoved(pos));
+        self.event(Event::PointerButton { pos, button, pressed, modifiers });
+    }
+
+    fn drags(&mut self, from: Pos2, to: Pos2, button: PointerButton, modifiers: Modifiers) {
+        self.event(Event::ModifiersChanged(modifiers));
+        self.button(from, button, true, modifiers);
+        for part in [0.25, 0.5, 0.75, 1.0] {
+            self.event(Event::PointerMoved(from + (to - from) * part));
+        }
+        self.button(to, button, false, modifiers);
+        self.event(Event::ModifiersChanged(Modifiers::NONE));
+    }
+
+    fn clicks(&mut self, at: Pos2) {
+        self.button(at, PointerButton::Primary, true, Modifiers::NONE);
+        self.button(at, PointerButton::Primary, false, Modifiers::NONE);
+    }
+
+    fn turns_wheel(&mut self, at: Pos2, points: f32) {
+        self.harness.event(Event::PointerMoved(at));
+        self.event(Event::MouseWheel {
+            unit: MouseWheelUnit::Point,
+            delta: vec2(0.0, points),
+            phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Wheel,
+            modifiers: Modifiers::NONE,
+        });
+        self.harness.run_steps(20);
+    }
+
+    fn presses(&mut self, key: egui::Key) {
+        self.harness.key_press(key);
+        self.harness.run_steps(2);
+    }
+
+    fn clicks_on(&mut self, label: &str) {
+        self.harness.get_by_label(label).click();
+        self.harness.run_steps(2);
+    }
+
+    /// Whether a part of the statue is in the picture: points of its surface, not those that the camera is held by.
+    fn sees_the_statue(&mut self) -> bool {
+        let viewer = self.harness.state();
+        let camera = viewer.camera(&viewer.own_viewpoint());
+        let bounds = viewer.bounds();
+        let (middle, half) = (bounds.center(), bounds.extent() * 0.5);
+        let mut pages = crate::pick::Pages::default();
+        let near = (0..=24).flat_map(|x| (0..=16).map(move |y| (x, y))).any(|(x, y)| {
+            let at = DVec2::new(f64::from(x * SIZE.width) / 24.0, f64::from(y * SIZE.height) / 16.0);
+            let ray = Ray { origin: camera.eye, direction: camera.ray_through(at) };
+            pages.first_hit(&self.files.statue.file, &ray).unwrap().is_some()
+        });
+        let view = camera.view_point(middle);
+        let small = view.z > half.length() && {
+            let pixel = camera.pixel_of_view_point(view);
+            pixel.x > 0.0 && pixel.y > 0.0 && pixel.x < f64::from(SIZE.width) && pixel.y < f64::from(SIZE.height)
+        };
+        near || small
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_opened_is_told_and_a_folder_is_a_choice() {
+    let mut person = Person::opens(&["missing.ply", "folder"]);
+    assert!(person.harness.query_by_label_contains("missing.ply: no such file").is_some());
+    assert!(person.harness.state().models.is_empty());
+    person.clicks_on("statue.glod");
+    person.waits_until(|viewer| viewer.models.len() == 1);
+    assert!(person.harness.query_by_label("other.ply").is_none(), "the choice is made");
+}
+
+/// A file that is let go over the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Err("the viewer opens files by their names".into())
+    }
+}
+
+#[test]
+fn what_is_dropped_onto_the_window_is_shown_with_the_rest() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.harness.input_mut().dropped_files.push(Arc::new(Dropped("statue.glod".into())));
+    person.waits_until(|viewer| viewer.models.len() == 2);
+    let orders = person.viewer().mailbox.receive(Some(Duration::ZERO)).orders;
+    assert!(matches!(&orders[..], [Order::Add(first, ..), Order::Add(second, ..)] if first != second));
+}
+
+#[test]
+fn the_mouse_turns_moves_and_comes_nearer() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let home = person.viewer().own_viewpoint();
+    person.drags(MIDDLE, MIDDLE + vec2(80.0, 30.0), PointerButton::Primary, Modifiers::NONE);
+    let turned = person.viewer().own_viewpoint();
+    assert_eq!(turned.target, home.target);
+    assert!((turned.eye - home.eye).length() > 0.1 * (home.eye - home.target).length());
+    person.drags(MIDDLE, MIDDLE + vec2(0.0, 60.0), PointerButton::Secondary, Modifiers::NONE);
+    let moved = person.viewer().own_viewpoint();
+    assert!(((moved.eye - moved.target) - (turned.eye - turned.target)).length() < 1e-9 && moved.eye != turned.eye);
+    person.turns_wheel(MIDDLE, 200.0);
+    let nearer = person.viewer().own_viewpoint();
+    assert!((nearer.eye - nearer.target).length() < 0.7 * (moved.eye - moved.target).length());
+    person.presses(egui::Key::Home);
+    assert_eq!(person.viewer().own_viewpoint(), home);
+    // A drag over the panel is not one over the picture.
+    person.drags(pos2(900.0, 400.0), pos2(900.0, 300.0), PointerButton::Primary, Modifiers::NONE);
+    assert_eq!(person.viewer().own_viewpoint(), home);
+    person.drags(MIDDLE, MIDDLE + vec2(40.0, 0.0), PointerButton::Primary, Modifiers::CTRL);
+    assert_eq!(person.viewer().own_viewpoint(), home);
+    assert!(person.viewer().settings.towards_light.is_some(), "with Ctrl it is the light that moves");
+}
+
+#[test]
+fn a_double_click_makes_a_point_of_the_surface_the_pivot() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let home = person.viewer().own_viewpoint();
+    let camera = person.viewer().camera(&home);
+    person.clicks(pos2(470.0, 300.0));
+    person.clicks(pos2(470.0, 300.0));
+    person.waits_until(|viewer| viewer.own_viewpoint().target != home.target);
+    let pivot = person.viewer().own_viewpoint().target;
+    let pixel = camera.pixel_of_view_point(camera.view_point(pivot));
+    assert!((pixel - DVec2::new(470.0, 300.0)).length() < 1e-6, "{pixel}: it lay under the cursor");
+}
+
+#[test]
+fn whoever_drags_at_random_does_not_lose_the_model() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.waits_until(|viewer| viewer.navigation.has_anchors());
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut random = |below: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % below
+    };
+    for step in 0..120 {
+        let mut place = || pos2(random(700) as f32, random(700) as f32);
+        let (from, to) = (place(), place());
+        match random(6) {
+            0 | 1 => person.drags(from, to, PointerButton::Primary, Modifiers::NONE),
+            2 => person.drags(from, to, PointerButton::Secondary, Modifiers::NONE),
+            3 => person.turns_wheel(from, random(800) as f32 - 300.0),
+            4 => {
+                person.presses(egui::Key::F);
+                person.drags(from, to, PointerButton::Primary, Modifiers::NONE);
+                person.presses(egui::Key::F);
+            }
+            _ => {
+                person.clicks(from);
+                person.clicks(from);
+            }
+        }
+        assert!(person.sees_the_statue(), "lost in step {step}: {:?}", person.viewer().own_viewpoint());
+    }
+}
+
+#[test]
+fn a_path_is_recorded_played_and_saved() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let home = person.viewer().own_viewpoint();
+    person.clicks_on("Record (R)");
+    person.drags(MIDDLE, MIDDLE + vec2(120.0, -40.0), PointerButton::Primary, Modifiers::NONE);
+    person.clicks_on("Stop (R)");
+    let end = person.viewer().own_viewpoint();
+    let frames = person.viewer().recorder.path().unwrap().frames.clone();
+    assert_eq!((frames[0].eye, frames[frames.len() - 1].eye), (home.eye, end.eye));
+    person.presses(egui::Key::Home);
+    person.presses(egui::Key::Space);
+    assert!(person.viewer().recorder.is_playing());
+    person.waits_until(|viewer| !viewer.recorder.is_playing());
+    let arrived = person.viewer().own_viewpoint();
+    assert!((arrived.eye - end.eye).length() < 1e-9 && (arrived.target - end.target).length() < 1e-9);
+    for button in ["Path", "Scene"] {
+        // The field beside it has the same name.
+        person.harness.get_by_role_and_label(egui::accesskit::Role::Button, button).click();
+        person.harness.run_steps(2);
+    }
+    person.waits_until(|viewer| !viewer.jobs.is_writing());
+    let mut written = person.files.written.lock().unwrap().clone();
+    written.sort();
+    let expected = [("statue.json", format!("{} poses", frames.len())), ("statue.toml", "1 models".to_string())];
+    assert_eq!(written, expected.map(|(name, what)| (PathBuf::from(name), what)));
+}
+
+#[test]
+fn a_distance_is_that_of_the_points_that_were_clicked() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.clicks_on("Pick points (M)");
+    for at in [pos2(420.0, 300.0), pos2(560.0, 420.0)] {
+        person.clicks(at);
+        // Two clicks in one place at once would be a double click.
+        person.harness.run_steps(60);
+    }
+    person.waits_until(|viewer| viewer.measuring.distance().is_some());
+    let viewer = person.viewer();
+    let camera = viewer.camera(&viewer.own_viewpoint());
+    let points: Vec<DVec3> = viewer.measuring.points().map(|found| found.point).collect();
+    for (point, clicked) in points.iter().zip([DVec2::new(420.0, 300.0), DVec2::new(560.0, 420.0)]) {
+        let pixel = camera.pixel_of_view_point(camera.view_point(*point));
+        assert!((pixel - clicked).length() < 1e-6, "{pixel}");
+    }
+    assert_eq!(viewer.measuring.distance().unwrap().0, (points[0] - points[1]).length());
+    assert!(person.harness.query_by_label_contains("Distance ").is_some());
+    assert!(person.harness.query_by_label_contains("from the splats").is_some());
+}
+
+#[test]
+fn what_is_chosen_in_the_panel_is_wished_for() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let wished = |person: &mut Person| person.viewer().mailbox.receive(Some(Duration::ZERO));
+    let before = wished(&mut person).wish.unwrap().1;
+    person.clicks_on("levels");
+    let levels = wished(&mut person).wish.unwrap().1;
+    assert!(levels.tint != before.tint && levels.camera == before.camera);
+    person.presses(egui::Key::P);
+    let orders = wished(&mut person).orders;
+    assert!(matches!(&orders[..], [Order::Picture(name)] if name == Path::new("statue-1.png")));
+    assert_eq!(person.viewer().names.picture, "statue-2.png");
+    person.presses(egui::Key::F1);
+    assert!(person.harness.query_by_label("Mouse and keys").is_some());
+    person.presses(egui::Key::F2);
+    assert!(person.harness.query_by_label("levels").is_none(), "the panel is hidden");
+}

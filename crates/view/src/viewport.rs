@@ -1,0 +1,198 @@
+//! Mouse and keys over the picture.
+
+use crate::measure::digits;
+use crate::navigation::Input;
+use crate::picker::Purpose;
+use crate::viewer::Viewer;
+use egui::{Align2, Color32, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
+use gigalod_geom::Camera;
+use glam::{DQuat, DVec2, DVec3};
+
+/// What is left of the distance after a notch of the wheel, 50 points of scrolling.
+const ZOOM_PER_NOTCH: f64 = 0.8;
+const POINTS_PER_NOTCH: f64 = 50.0;
+
+/// Flight, in distances to the pivot a second.
+const SPEED: f64 = 0.8;
+
+/// With the shift key.
+const FASTER: f64 = 4.0;
+
+/// A surface point stays under the cursor as long as that moves no farther, in pixels.
+const SAME_PLACE_PX: f64 = 6.0;
+
+/// Radians that the light turns for each point of a drag.
+const LIGHT_PER_POINT: f64 = 0.01;
+
+impl Viewer {
+    /// Keys that work wherever the mouse is, unless something is being typed.
+    pub(crate) fn keys(&mut self, ui: &Ui, now: f64) {
+        // By the modifiers at the moment of the key: they may be up again by now.
+        self.wants_to_quit |= ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Q));
+        if ui.ctx().text_edit_focused() {
+            return;
+        }
+        let pressed = |key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+        if pressed(Key::Home) {
+            self.steer(&Input::Home, now);
+        }
+        if pressed(Key::P) {
+            self.take_picture(now);
+        }
+        if pressed(Key::R) {
+            self.toggle_recording(now);
+        }
+        if pressed(Key::Space) {
+            self.toggle_playing(now);
+        }
+        for (key, toggled) in [
+            (Key::F1, &mut self.shows_help),
+            (Key::F, &mut self.flies),
+            (Key::F2, &mut self.shows_panel),
+            (Key::M, &mut self.measuring.is_on),
+        ] {
+            *toggled ^= pressed(key);
+        }
+        if pressed(Key::Escape) {
+            (self.shows_help, self.measuring.is_on) = (false, false);
+            self.measuring.clear();
+        }
+        self.fly(ui, now);
+    }
+
+    pub(crate) fn toggle_playing(&mut self, now: f64) {
+        if self.recorder.is_playing() {
+            self.steer(&Input::Orbit { by_px: DVec2::ZERO }, now);
+        } else if self.recorder.path().is_some() {
+            self.recorder.play(now);
+        } else {
+            self.notice("no camera path: record one, or drop a PATH.json here", now);
+        }
+    }
+
+    /// Flight while its keys are down.
+    fn fly(&mut self, ui: &Ui, now: f64) {
+        let (by, seconds) = ui.input(|input| {
+            let axis = |plus: Key, minus: Key| {
+                f64::from(u8::from(input.key_down(plus))) - f64::from(u8::from(input.key_down(minus)))
+            };
+            let by = DVec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
+            let held = if input.modifiers.command { DVec3::ZERO } else { by };
+            (held * if input.modifiers.shift { FASTER } else { 1.0 }, f64::from(input.stable_dt).min(0.1))
+        });
+        if by != DVec3::ZERO {
+            self.steer(&Input::Fly { by: by * (SPEED * seconds) }, now);
+            ui.request_repaint();
+        }
+    }
+
+    /// The picture's part of the window: drags, wheel, clicks.
+    pub(crate) fn viewport(&mut self, ui: &mut Ui) {
+        let frame = egui::CentralPanel::no_frame();
+        frame.show(ui, |ui| {
+            let rect = ui.max_rect();
+            let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
+            self.mouse(ui, &response);
+            self.draw_measurement(ui);
+            if self.models.is_empty() && self.jobs.running().is_empty() && self.folder.is_none() {
+                ui.painter().text(
+                    rect.center(),
+                    Align2::CENTER_CENTER,
+                    "Drop a model, a scene, a folder or a camera path here",
+                    FontId::proportional(22.0),
+                    Color32::from_gray(190),
+                );
+            }
+        });
+    }
+
+    fn mouse(&mut self, ui: &Ui, response: &egui::Response) {
+        let now = ui.input(|input| input.time);
+        let scale = f64::from(ui.ctx().pixels_per_point());
+        let px = |at: Pos2| DVec2::new(f64::from(at.x), f64::from(at.y)) * scale;
+        let drag = response.drag_delta();
+        let by_px = DVec2::new(f64::from(drag.x), f64::from(drag.y)) * scale;
+        let modifiers = ui.input(|input| input.modifiers);
+        if by_px != DVec2::ZERO {
+            let pans = response.dragged_by(PointerButton::Secondary)
+                || response.dragged_by(PointerButton::Middle)
+                || modifiers.shift;
+            if modifiers.ctrl && response.dragged_by(PointerButton::Primary) {
+                self.drag_light(drag);
+            } else if pans {
+                self.steer(&Input::Pan { by_px }, now);
+            } else if self.flies {
+                // The eye follows the hand, as a head that turns.
+                self.steer(&Input::Look { by_px: -by_px }, now);
+            } else {
+                self.steer(&Input::Orbit { by_px }, now);
+            }
+        }
+        if self.measuring.is_on && response.hovered() {
+            ui.set_cursor_icon(CursorIcon::Crosshair);
+        }
+        if let Some(at) = response.interact_pointer_pos() {
+            if response.double_clicked() && !self.measuring.is_on {
+                self.pick(Purpose::Pivot, px(at));
+            } else if response.clicked() && self.measuring.is_on {
+                let number = self.measuring.begin();
+                self.pick(Purpose::Measure(number), px(at));
+            }
+        }
+        let wheel = ui.input(|input| f64::from(input.smooth_scroll_delta().y)) / POINTS_PER_NOTCH;
+        let pinch = ui.input(|input| f64::from(input.zoom_delta()));
+        let factor = ZOOM_PER_NOTCH.powf(wheel) / pinch;
+        if let Some(at) = response.hover_pos().filter(|_| factor != 1.0) {
+            self.zoom(px(at), factor, now);
+        }
+    }
+
+    fn zoom(&mut self, at_px: DVec2, factor: f64, now: f64) {
+        let known = self.under_cursor.filter(|(place, _)| place.distance(at_px) <= SAME_PLACE_PX);
+        if known.is_none() {
+            self.pick(Purpose::Zoom, at_px);
+        }
+        self.steer(&Input::Zoom { factor, at_px, surface: known.map(|(_, point)| point) }, now);
+    }
+
+    /// Turns the light as if it hung on the hand.
+    fn drag_light(&mut self, by: egui::Vec2) {
+        let camera = self.camera(&self.own_viewpoint());
+        let light = self.settings.towards_light.unwrap_or(camera.shoulder_light());
+        let turn = DQuat::from_axis_angle(camera.up, f64::from(by.x) * LIGHT_PER_POINT)
+            * DQuat::from_axis_angle(camera.right, f64::from(by.y) * LIGHT_PER_POINT);
+        self.settings.towards_light = (turn * light).try_normalize();
+    }
+
+    /// Picked points, and the distance between them.
+    fn draw_measurement(&mut self, ui: &Ui) {
+        let now = ui.input(|input| input.time);
+        let viewpoint = self.viewpoint(now);
+        let camera = self.camera(&viewpoint);
+        let scale = ui.ctx().pixels_per_point();
+        let places: Vec<Pos2> =
+            self.measuring.points().filter_map(|found| place(&camera, found.point, scale)).collect();
+        let color = Color32::from_rgb(255, 170, 60);
+        let painter = ui.painter();
+        if let ([a, b], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
+            painter.line_segment([*a, *b], Stroke::new(1.5, color));
+            let middle = *a + (*b - *a) * 0.5;
+            let text = digits(distance, uncertain);
+            let font = FontId::proportional(15.0);
+            let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
+            let at = egui::Rect::from_center_size(middle, galley.size());
+            painter.rect_filled(at.expand(4.0), 4.0, Color32::from_black_alpha(190));
+            painter.galley(at.min, galley, Color32::WHITE);
+        }
+        for at in places {
+            painter.circle(at, 4.0, color, Stroke::new(1.0, Color32::BLACK));
+        }
+    }
+}
+
+/// Where a world-space point appears, in egui's points; `None` behind the eye.
+fn place(camera: &Camera, point: DVec3, scale: f32) -> Option<Pos2> {
+    let in_view = camera.view_point(point);
+    let pixel = camera.pixel_of_view_point(in_view);
+    (in_view.z > 0.0 && pixel.is_finite()).then(|| Pos2::new(pixel.x as f32 / scale, pixel.y as f32 / scale))
+}
