@@ -5,12 +5,13 @@
 
 mod building;
 mod drawing;
+mod importing;
 
 use crate::figures::{self, Row};
 use crate::program::{Program, number};
 use crate::setup;
 use crate::steps::{cargo, project, run, target};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,14 +23,15 @@ const RUNS: usize = 3;
 struct Scope<'a> {
     /// Also a model of 100 million triangles.
     large: bool,
-    /// One section instead of all: printed, not written.
+    /// One section instead of all.
     only: Option<&'a str>,
 }
 
 /// A heading, and what fills its table.
 type Section = (&'static str, fn(&Bench, Scope<'_>, &mut Vec<Row>) -> Result<()>);
 
-const SECTIONS: [Section; 2] = [("building", building::rows), ("drawing", drawing::rows)];
+const SECTIONS: [Section; 3] =
+    [("importing", importing::rows), ("building", building::rows), ("drawing", drawing::rows)];
 
 pub(crate) fn bench(arguments: &[String]) -> Result<()> {
     let scope = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
@@ -37,34 +39,47 @@ pub(crate) fn bench(arguments: &[String]) -> Result<()> {
         ["--large"] => Scope { large: true, only: None },
         ["--only", section] => Scope { large: false, only: Some(section) },
         ["--large", "--only", section] => Scope { large: true, only: Some(section) },
-        _ => bail!("usage: cargo xtask bench [--large] [--only building|drawing]"),
+        _ => bail!("usage: cargo xtask bench [--large] [--only importing|building|drawing]"),
     };
     setup::system()?;
     let bench = Bench(Program::build("bench")?);
-    let mut report = String::new();
+    let path = project().join("docs/benchmarks.md");
+    let mut found = false;
     for (name, fill) in SECTIONS.iter().filter(|(name, _)| scope.only.is_none_or(|only| only == *name)) {
         let mut rows = Vec::new();
         fill(&bench, scope, &mut rows)?;
-        report.push_str(&format!("\n## {}{}\n\n", name[..1].to_uppercase(), &name[1..]));
-        figures::table(&rows, &mut report);
+        let mut section = format!("## {}{}\n\n{}\n\n", name[..1].to_uppercase(), &name[1..], origin(scope.large)?);
+        figures::table(&rows, &mut section);
+        print!("\n{section}");
+        // Each as soon as it is measured, so that none is lost with a later one.
+        let before = std::fs::read_to_string(&path).unwrap_or_default();
+        std::fs::write(&path, with_section(&before, &section))?;
+        found = true;
     }
-    if report.is_empty() {
-        bail!("no such section: {}", scope.only.unwrap_or_default());
-    }
-    print!("{report}");
-    if scope.only.is_none() {
-        std::fs::write(project().join("docs/benchmarks.md"), format!("{}{report}", preface(scope.large)?))?;
-    }
+    ensure!(found, "no such section: {}", scope.only.unwrap_or_default());
     Ok(())
 }
 
-fn preface(large: bool) -> Result<String> {
-    Ok(format!(
-        "# Benchmarks\n\nWritten by `cargo xtask bench{}` on {}; default options unless said otherwise. Times are user\n\
-         and system seconds, of builds the median of {RUNS} runs, page cache warm. A target that is missed says so.\n",
-        if large { " --large" } else { "" },
-        figures::machine()?
-    ))
+const PREFACE: &str = "# Benchmarks
+
+Written by `cargo xtask bench`; default options unless said otherwise. Times are user and system seconds, of builds the median
+of three runs, page cache warm. A target that is missed says so.
+";
+
+fn origin(large: bool) -> Result<String> {
+    Ok(format!("With{} models of 100 million triangles, on {}.", if large { "" } else { "out" }, figures::machine()?))
+}
+
+/// The report with a section in place of what stood under its heading; others stay, in their order.
+fn with_section(report: &str, section: &str) -> String {
+    let heading = |text: &str| text.lines().next().unwrap_or_default().to_owned();
+    let parts = report.split("\n## ").skip(1).map(|part| format!("## {}\n", part.trim_end()));
+    let mut sections: Vec<String> = parts.collect();
+    match sections.iter_mut().find(|old| heading(old) == heading(section)) {
+        Some(old) => *old = section.to_owned(),
+        None => sections.push(section.to_owned()),
+    }
+    format!("{PREFACE}\n{}", sections.join("\n"))
 }
 
 /// The program and its folder of models.
@@ -91,6 +106,16 @@ impl Bench {
 
     /// Runs an example of a package, given arguments in the folder of models; the JSON object that it prints.
     fn example(&self, package: &str, name: &str, arguments: &[&str]) -> Result<Value> {
+        let text = self.output(package, name, arguments)?;
+        serde_json::from_str(&text).with_context(|| format!("example {name}: {text}"))
+    }
+
+    /// The same for one that prints lines.
+    fn lines(&self, package: &str, name: &str, arguments: &[&str]) -> Result<Vec<String>> {
+        Ok(self.output(package, name, arguments)?.lines().map(String::from).collect())
+    }
+
+    fn output(&self, package: &str, name: &str, arguments: &[&str]) -> Result<String> {
         run(&mut cargo(&["build", "--release", "--quiet", "--package", package, "--example", name]))?;
         let program = target().join("release/examples").join(name);
         let out = Command::new(program.canonicalize()?).args(arguments).current_dir(&self.0.folder).output()?;
@@ -98,7 +123,7 @@ impl Bench {
         if !out.status.success() {
             bail!("example {name} {}: {text}{}", arguments.join(" "), String::from_utf8_lossy(&out.stderr));
         }
-        serde_json::from_str(&text).with_context(|| format!("example {name}: {text}"))
+        Ok(text.into_owned())
     }
 }
 
@@ -117,4 +142,18 @@ fn middle(mut reports: Vec<Value>, key: &str) -> Value {
     reports.sort_by(|a, b| number(a, key).total_cmp(&number(b, key)));
     let middle = reports.len() / 2;
     reports.swap_remove(middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_section;
+
+    #[test]
+    fn a_section_takes_the_place_of_the_old_one() {
+        let first = with_section("", "## Building\n\n| a |\n");
+        let both = with_section(&first, "## Drawing\n\n| b |\n");
+        assert!(both.ends_with("\n\n## Building\n\n| a |\n\n## Drawing\n\n| b |\n"), "{both}");
+        let again = with_section(&both, "## Building\n\n| c |\n");
+        assert_eq!(again, both.replace("| a |", "| c |"));
+    }
 }

@@ -5,6 +5,7 @@
 
 mod bench;
 mod figures;
+mod fuzz;
 mod program;
 mod setup;
 mod soak;
@@ -18,10 +19,12 @@ cargo xtask COMMAND
 
   demo [ARGS]   make a statue of 2 million triangles, build it, draw four pictures into ./demo
   test          everything CI runs: format, lints, documentation, tests, shaders, web build
-  bench [--large] [--only building|drawing]  measure against the targets, write docs/benchmarks.md (about 12 minutes; with 100 M
-                triangles 20); one section alone is printed, not written
-  soak [--triangles N] [--largest]  what takes too long for `test`: 50 kills of a build of 5 million triangles; memory, disk
-                and verify of 100 million (or N ≥ 10 million), written to docs/soak.md; with 372 million as well, which needs 30 GB of disk
+  bench [--large] [--only importing|building|drawing]  measure against the targets, write docs/benchmarks.md (about 20 minutes;
+                with 100 M triangles 30)
+  soak [--triangles N] [--largest]  what takes too long for `test`: 50 kills of a build of 5 million triangles; a minute of
+                fuzzing each reader; memory, disk and verify of 100 million triangles (or N ≥ 10 million), written to docs/soak.md;
+                with 372 million as well, which needs 30 GB of disk
+  fuzz [SECONDS]  bytes of all kinds to each reader, for a minute each; installs a nightly compiler and cargo-fuzz (part of soak)
   setup         install what demo and test need (they do it by themselves)
 
 Environment of `test` and `bench`:
@@ -38,6 +41,7 @@ fn main() -> Result<()> {
         "demo" => steps::demo(&rest),
         "bench" => bench::bench(&rest),
         "soak" => soak::soak(&rest),
+        "fuzz" => fuzz::fuzz(fuzz::seconds(&rest)?),
         "test" if rest.is_empty() => steps::test(),
         "" | "help" | "-h" | "--help" => {
             print!("{HELP}");

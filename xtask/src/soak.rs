@@ -5,6 +5,7 @@
 //! a hundred times a second, so what the program says of itself is not believed but compared.
 
 use crate::figures::{self, Row, at_most, plain};
+use crate::fuzz;
 use crate::program::{Program, number};
 use crate::steps::project;
 use crate::watch::{self, Peaks};
@@ -41,6 +42,8 @@ pub(crate) fn soak(arguments: &[String]) -> Result<()> {
     let soak = Soak(Program::build("soak")?);
     let mut rows = Vec::new();
     soak.kills(5_000_000, &mut rows)?;
+    fuzz::fuzz(fuzz::USUAL_SECONDS)?;
+    rows.push(plain("fuzzing of all readers".into(), format!("{} s each, nothing found", fuzz::USUAL_SECONDS)));
     soak.out_of_core("statue.ply", triangles, "512MiB", &mut rows)?;
     if largest {
         soak.out_of_core("largest.ply", 372_000_000, "2GiB", &mut rows)?;

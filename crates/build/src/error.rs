@@ -49,6 +49,24 @@ pub enum BuildError {
         /// That the budget has room for.
         most: u64,
     },
+    /// A picture has to be decoded in memory.
+    #[error("{picture} needs {needed} bytes to be decoded, expected at most {most} within this budget")]
+    LargePicture {
+        /// As the model names it.
+        picture: String,
+        /// Bytes that it needs.
+        needed: u64,
+        /// Bytes that the budget has room for.
+        most: u64,
+    },
+    /// The spacing that was asked for is too small for the model.
+    #[error("about {samples:e} samples at a spacing of {spacing}, expected fewer than 2^31")]
+    TooFine {
+        /// As it was asked for.
+        spacing: f64,
+        /// That would be needed.
+        samples: f64,
+    },
     /// More than the format's numbers can count.
     #[error("{found} vertices, expected fewer than 2^31")]
     TooManyVertices {

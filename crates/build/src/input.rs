@@ -1,4 +1,4 @@
-//! Which file a build is of, as far as it can be told without reading all of it.
+//! Which files a build is of, as far as it can be told without reading all of them.
 
 use gigalod_format::checksum;
 use gigalod_import::utc;
@@ -11,6 +11,13 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Tells one input from another, and from itself after a change.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputIdentity {
+    /// Its files, in order.
+    pub files: Vec<FileIdentity>,
+}
+
+/// Tells one file from another, and from itself after a change.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileIdentity {
     /// Where it lies, from the root.
     pub path: String,
     /// Its length.
@@ -24,7 +31,7 @@ pub struct InputIdentity {
 /// Bytes of an end.
 const END_BYTES: u64 = 64 << 10;
 
-impl InputIdentity {
+impl FileIdentity {
     /// Of a file as it is now, which lies at `path`. Afterwards it stands anywhere.
     ///
     /// # Errors
@@ -53,8 +60,8 @@ impl InputIdentity {
         UNIX_EPOCH.checked_add(Duration::new(seconds, nanoseconds)).unwrap_or(UNIX_EPOCH)
     }
 
-    /// The first thing by which two inputs differ, of this one and of the other.
-    pub(crate) fn difference(&self, other: &Self) -> Option<(String, String)> {
+    /// The first thing by which two files differ, of this one and of the other.
+    fn difference(&self, other: &Self) -> Option<(String, String)> {
         let facts = |input: &Self| {
             [
                 input.path.clone(),
@@ -64,5 +71,14 @@ impl InputIdentity {
             ]
         };
         facts(self).into_iter().zip(facts(other)).find(|(own, others)| own != others)
+    }
+}
+
+impl InputIdentity {
+    /// The first thing by which two inputs differ, of this one and of the other.
+    pub(crate) fn difference(&self, other: &Self) -> Option<(String, String)> {
+        let of_file = self.files.iter().zip(&other.files).find_map(|(own, others)| own.difference(others));
+        let count = |input: &Self| format!("{} files", input.files.len());
+        of_file.or_else(|| (self.files.len() != other.files.len()).then(|| (count(self), count(other))))
     }
 }

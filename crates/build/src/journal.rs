@@ -41,7 +41,7 @@ pub(crate) struct Extent {
 }
 
 /// First word of each journal; the number changes with the meaning of journals or spools.
-const MAGIC: &str = "gigalod-build-journal-2";
+const MAGIC: &str = "gigalod-build-journal-3";
 
 impl Journal {
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
@@ -84,9 +84,11 @@ impl Header {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::FileIdentity;
 
     fn journal() -> Journal {
-        let input = InputIdentity { path: "/a".into(), bytes: 7, modified: (1, 2), ends: [3, 4] };
+        let file = |path: &str| FileIdentity { path: path.into(), bytes: 7, modified: (1, 2), ends: [3, 4] };
+        let input = InputIdentity { files: vec![file("/a"), file("/b")] };
         let header = Header { program: "gigalod".into(), input, options: BTreeMap::from([("up".into(), "y".into())]) };
         let spools = BTreeMap::from([("leaves".into(), Extent { records: 5, record_bytes: 20, checksum: 7 })]);
         let state = serde_json::json!({ "origin": [0.1, 1e-300, f64::MAX] });
@@ -112,7 +114,11 @@ mod tests {
         let mut other = ours.clone();
         other.options.insert("up".into(), "z".into());
         assert_eq!(ours.difference(&other), Some(("with other options", "--up y".into(), "--up z".into())));
-        other.input.bytes = 8;
+        other.input.files[1].bytes = 8;
         assert_eq!(ours.difference(&other), Some(("of another input", "7 bytes".into(), "8 bytes".into())));
+        other.input.files.pop();
+        assert_eq!(ours.difference(&other), Some(("of another input", "2 files".into(), "1 files".into())));
+        other.input.files[0].path = "/c".into();
+        assert_eq!(ours.difference(&other), Some(("of another input", "/a".into(), "/c".into())));
     }
 }

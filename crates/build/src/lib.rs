@@ -15,12 +15,13 @@ mod unfinished;
 mod work;
 
 pub use error::BuildError;
-pub use input::InputIdentity;
+pub use input::{FileIdentity, InputIdentity};
 pub use output::Output;
 pub use progress::{NoProgress, PhaseTime, Progress, Report};
 pub use unfinished::abandon;
 pub use work::{can_continue, work_folder};
 
+use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 
 /// What the user may choose; the same for all representations.
@@ -32,6 +33,11 @@ pub struct Options {
     pub threads: usize,
     /// Overrides the format's convention.
     pub up: Option<UpAxis>,
+    /// Triangles whose bounding circle is larger than this, in model units, are diced into samples that far apart. `None`: what
+    /// suits the model, as [`splats`] says.
+    pub spacing: Option<f64>,
+    /// What a length of 1 is; overrides what the input says. Coordinates stay as they are.
+    pub unit: Option<LengthUnit>,
     /// What is built. Where it is given, a build that does not fit into memory can be continued by another process: what it
     /// has lies in [`work_folder`].
     pub input: Option<InputIdentity>,
@@ -46,6 +52,6 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { memory_bytes: 2 << 30, threads: 0, up: None, input: None, resume: false }
+        Self { memory_bytes: 2 << 30, threads: 0, up: None, spacing: None, unit: None, input: None, resume: false }
     }
 }

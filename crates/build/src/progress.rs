@@ -64,6 +64,10 @@ impl<'a> Phases<'a> {
         self.watcher.at(done);
     }
 
+    pub(crate) fn note(&self, text: &str) {
+        self.watcher.note(text);
+    }
+
     pub(crate) fn times(self) -> Vec<PhaseTime> {
         let begun = self.begun.into_inner().expect("no thread panics while it holds the lock");
         let ends = begun.iter().skip(1).map(|(_, at)| *at).chain([Instant::now()]);

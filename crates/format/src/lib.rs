@@ -16,5 +16,5 @@ pub mod store;
 
 pub use container::{Container, HEADER_BYTES, Kind, MAGIC, Section, VERSION, Writer, checksum};
 pub use error::FormatError;
-pub use metadata::{Bounds, InputCounts, LevelSummary, Metadata};
+pub use metadata::{Bounds, Dicing, InputCounts, LevelSummary, Metadata, ReferenceSystem};
 pub use store::{FileStore, MemoryStore, PageStore};

@@ -40,6 +40,28 @@ pub struct LevelSummary {
     pub max_error: f64,
 }
 
+/// How large triangles were cut into samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Dicing {
+    /// No sample stands for more than a square of this size; model units.
+    pub spacing: f64,
+    /// Triangles that were cut, or became a sample each.
+    pub triangles: u64,
+    /// Leaves that they became; all others are vertices.
+    pub samples: u64,
+}
+
+/// What the model's coordinates mean on the Earth, as far as its file said; nothing of it is needed to draw.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReferenceSystem {
+    /// What the file called it.
+    pub name: Option<String>,
+    /// Number in the register of EPSG.
+    pub epsg: Option<u32>,
+    /// Description in well-known text.
+    pub wkt: Option<String>,
+}
+
 /// Facts about a file and how it was built. Never a time, a path or a machine: same input and options, same bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {
@@ -47,7 +69,8 @@ pub struct Metadata {
     pub generator: String,
     /// What was read.
     pub input: InputCounts,
-    /// Build options by their command-line names.
+    /// Build options by their command-line names, as they took effect. `units` is there where somebody said what a length of 1
+    /// is: `m`, `mm`, `cm`, `km`, `ft`, `us-ft` or `in`.
     pub options: BTreeMap<String, String>,
     /// All nodes.
     pub nodes: u64,
@@ -62,8 +85,14 @@ pub struct Metadata {
     pub closed: bool,
     /// Around all referenced vertices.
     pub bounds: Bounds,
+    /// Where the input said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_system: Option<ReferenceSystem>,
     /// Of `"normals"`, `"colors"`, …: what the nodes carry.
     pub attributes: Vec<String>,
+    /// How large triangles were cut, if any were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dicing: Option<Dicing>,
     /// Coarse to fine.
     pub per_level: Vec<LevelSummary>,
 }

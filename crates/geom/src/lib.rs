@@ -1,4 +1,4 @@
-//! Boxes, spheres, cones, frusta, cameras, quantisers and projected error: the vocabulary of every other crate.
+//! Boxes, spheres, cones, frusta, cameras, quantisers, projected error and units: the vocabulary of every other crate.
 //!
 //! No I/O, no GPU, no unsafe, no platform `libm`: the same input gives the same bits on every machine.
 //!
@@ -19,6 +19,7 @@ pub mod path;
 pub mod projected;
 pub mod quantise;
 pub mod sphere;
+pub mod unit;
 
 pub use aabb::Aabb;
 pub use camera::{Camera, ImageSize};
@@ -26,3 +27,4 @@ pub use cone::NormalCone;
 pub use frustum::Frustum;
 pub use path::{CameraPath, Pose};
 pub use sphere::Sphere;
+pub use unit::LengthUnit;

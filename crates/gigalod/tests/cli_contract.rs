@@ -26,8 +26,9 @@ fn build_and_info_report_exactly_the_keys_of_the_contract() {
     assert_eq!(
         shape(&ran.json()),
         format!(
-            "{{attributes[] bounds{{max[] min[]}} bytes closed {INPUT} kind leaves levels nodes options{{..}} \
-             per_level[{{bytes level max_error nodes points triangles}}] raw_bytes version}}"
+            "{{attributes[] bounds{{max[] min[]}} bytes closed dicing {INPUT} kind leaves levels nodes options{{..}} \
+             per_level[{{bytes level max_error nodes points triangles}}] raw_bytes \
+             reference_system units version}}"
         )
     );
 }
@@ -131,7 +132,7 @@ fn what_cannot_be_done_ends_with_status_1_and_one_line() {
 
     let out = path("a.glod");
     run!["build", missing, "-o", out, "--json"].failed(&missing);
-    assert!(run!["build", folder.path(), "-o", out, "--json"].failed(folder.path()).contains("not a regular file"));
+    assert!(run!["info", folder.path(), "--json"].failed(folder.path()).contains("not a regular file"));
     run!["build", broken, "-o", out, "--json"].failed(&broken);
     let ran = run!["build", cut, "-o", out, "--json"];
     ran.failed(&cut);
@@ -177,7 +178,7 @@ fn wrong_usage_ends_with_status_2_and_says_what_is_wrong() {
         (words(&["frobnicate"]), "frobnicate"),
         (words(&["build", ply]), "--output"),
         (words(&["build", "-o", out]), "INPUT"),
-        (words(&["build", ply, ply, "-o", out]), "2 inputs"),
+        (words(&["build", ply, "-o", out, "--units", "feet"]), "us-ft"),
         (words(&["build", ply, "-o", out, "--memory", "63MiB"]), "64MiB"),
         (words(&["build", ply, "-o", out, "--memory", "lots"]), "lots"),
         (words(&["build", ply, "-o", out, "--threads", "100000"]), "1024"),

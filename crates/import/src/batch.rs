@@ -53,18 +53,64 @@ pub struct Batch {
 }
 
 /// How a surface looks, as far as this crate reads it.
+///
+/// What shows is the product, in linear light, of the vertices' colours, `color` and the texture, of those that there are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// As in the file; perhaps empty.
     pub name: String,
-    /// 8-bit sRGB: of the surface where there is no texture, a factor to the texture where there is one.
+    /// 8-bit sRGB.
     pub color: [u8; 3],
-    /// A picture of colours.
+    /// True where the vertices' colours have `color` in them already.
+    pub is_in_vertices: bool,
+    /// A picture of colours. Two materials of a model with equal ones have the same picture.
     pub texture: Option<Texture>,
+    /// How texture coordinates name places of the picture.
+    pub mapping: Mapping,
+    /// What is less opaque in the picture, from 0 to 255, is not there at all. Without it everything is opaque.
+    pub alpha_cutoff: Option<u8>,
+}
+
+impl Material {
+    /// White, without a picture.
+    pub fn plain(name: String) -> Self {
+        let (color, mapping) = ([255; 3], Mapping::default());
+        Self { name, color, is_in_vertices: false, texture: None, mapping, alpha_cutoff: None }
+    }
+}
+
+/// From texture coordinates to places of a picture: `scale · coordinate + offset`, then `wrap`, along u and v. Within the picture
+/// both are from 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mapping {
+    /// A factor to each coordinate; finite.
+    pub scale: [f32; 2],
+    /// Added after that; finite.
+    pub offset: [f32; 2],
+    /// What is outside the picture.
+    pub wrap: [Wrap; 2],
+}
+
+impl Default for Mapping {
+    fn default() -> Self {
+        Self { scale: [1.0; 2], offset: [0.0; 2], wrap: [Wrap::Repeat; 2] }
+    }
+}
+
+/// What is outside a picture, along one of its axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The picture again.
+    #[default]
+    Repeat,
+    /// The picture again, every other time mirrored.
+    Mirror,
+    /// The picture's border.
+    Clamp,
 }
 
 /// Where the picture of a texture is.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Texture {
     /// A file beside the model, by the name that the model has for it.
     File(String),

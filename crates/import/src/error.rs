@@ -17,6 +17,7 @@ pub struct ImportError(Box<Report>);
 struct Report {
     problem: Problem,
     place: Option<Place>,
+    file: Option<String>,
 }
 
 /// What is wrong.
@@ -76,12 +77,37 @@ pub enum Problem {
         /// As it is now.
         found: Stamp,
     },
+    /// One of several files is not like those before it.
+    #[error("expected {expected} as in {first}, found {found}")]
+    Differs {
+        /// In what.
+        what: Shared,
+        /// What those before have.
+        expected: String,
+        /// The first that has it.
+        first: String,
+        /// What this one has.
+        found: String,
+    },
     /// The source of the bytes failed; the file itself may be good.
     #[error("expected to read on, found an input error: {source}")]
     Io {
         /// What the source said.
         source: io::Error,
     },
+}
+
+/// What several files that are one model have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shared {
+    /// All are meshes, or all are point clouds.
+    Kind,
+    /// The direction of the sky.
+    Up,
+    /// What a length of 1 is.
+    Unit,
+    /// What coordinates mean on the Earth.
+    ReferenceSystem,
 }
 
 /// Where in a file; displays as `line 12`, `line 12, face 3`, `byte 3041` or `byte 3041, face 17`.
@@ -113,7 +139,13 @@ pub struct Item {
 
 impl ImportError {
     pub(crate) fn new(problem: Problem, place: Option<Place>) -> Self {
-        Self(Box::new(Report { problem, place }))
+        Self(Box::new(Report { problem, place, file: None }))
+    }
+
+    /// Of a material without a texture.
+    pub(crate) fn no_picture(material: u32) -> Self {
+        let source = io::Error::new(io::ErrorKind::NotFound, format!("material {material} has no picture"));
+        Self::new(Problem::Io { source }, None)
     }
 
     pub(crate) fn malformed(expected: impl Into<String>, found: impl Into<String>, place: Place) -> Self {
@@ -124,6 +156,18 @@ impl ImportError {
         Self::new(Problem::Truncated { before: before.into() }, Some(place))
     }
 
+    /// Says which of several files it is of; the innermost word counts.
+    pub(crate) fn of_file(mut self, name: &str) -> Self {
+        self.0.file.get_or_insert_with(|| name.to_owned());
+        self
+    }
+
+    /// Which of several files it is of, by the name that [`Part`](crate::Part) has for it; none of a model in one file, whose
+    /// name the caller knows.
+    pub fn file(&self) -> Option<&str> {
+        self.0.file.as_deref()
+    }
+
     /// What is wrong, without where: its `Display` is the message.
     pub fn what(&self) -> &Problem {
         &self.0.problem
@@ -132,6 +176,12 @@ impl ImportError {
     /// Where, unless the file as a whole is wrong.
     pub fn place(&self) -> Option<&Place> {
         self.0.place.as_ref()
+    }
+}
+
+impl From<io::Error> for ImportError {
+    fn from(source: io::Error) -> Self {
+        Self::new(Problem::Io { source }, None)
     }
 }
 

@@ -15,6 +15,7 @@ mod error;
 pub mod gltf;
 mod input;
 pub mod las;
+mod many;
 mod number;
 pub mod obj;
 pub mod off;
@@ -23,6 +24,7 @@ pub mod pcd;
 pub mod ply;
 mod polygon;
 mod positions;
+mod reference;
 mod side;
 pub mod stl;
 mod text;
@@ -30,12 +32,15 @@ mod watch;
 mod weld;
 pub mod xyz;
 
-pub use batch::{Attributes, Batch, CornerBatch, Material, Texture, VertexBatch, read_all};
-pub use error::{ImportError, Item, Place, Position, Problem};
-pub use open::{open, open_with};
+pub use batch::{Attributes, Batch, CornerBatch, Mapping, Material, Texture, VertexBatch, Wrap, read_all};
+pub use error::{ImportError, Item, Place, Position, Problem, Shared};
+pub use many::{OpenPart, Part, Together, open_all};
+pub use open::{format_of, open, open_with};
+pub use reference::ReferenceSystem;
 pub use side::{NoSideFiles, SideFiles};
-pub use watch::{AskStamp, Stamp, open_watched, utc};
+pub use watch::{AskStamp, Stamp, open_watched, open_watched_since, utc};
 
+use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use std::io::{Read, Seek};
 
@@ -53,9 +58,29 @@ pub trait ModelStream: Send {
         UpAxis::Y
     }
 
+    /// What a length of 1 is, where the file or its format says so; known before the first batch. Of coordinates on a map, the
+    /// unit of the horizontal ones.
+    fn unit(&self) -> Option<LengthUnit> {
+        None
+    }
+
+    /// What the coordinates mean on the Earth, where the file says so; known before the first batch.
+    fn reference_system(&self) -> Option<&ReferenceSystem> {
+        None
+    }
+
     /// Materials that triangles of the batches so far have named, by number; there may be more after the next batch.
     fn materials(&self) -> &[Material] {
         &[]
+    }
+
+    /// The file of a material's texture, PNG or JPEG, by the material's number and what [`ModelStream::materials`] says of it; to be
+    /// asked for after the last batch.
+    ///
+    /// # Errors
+    /// There is no such picture, or its file cannot be had.
+    fn open_picture(&mut self, material: u32, _texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        Err(ImportError::no_picture(material))
     }
 
     /// Number of vertices, where the file says so before they come. Checked against what comes.

@@ -49,6 +49,28 @@ pub fn open(source: Box<dyn ByteSource>) -> Result<Box<dyn ModelStream>, ImportE
     open_with(source, Box::new(NoSideFiles))
 }
 
+/// Name of the format that a file seems to be of, by its first bytes, plain or in gzip; none where it is no model. Nothing else of
+/// the file is looked at: it may still be broken.
+///
+/// # Errors
+/// The source fails, or what is packed cannot be unpacked.
+pub fn format_of(source: Box<dyn ByteSource>) -> Result<Option<&'static str>, ImportError> {
+    let mut input = Input::new(source)?;
+    input.has(START_BYTES)?;
+    let start = &input.window()[..input.window().len().min(START_BYTES)];
+    Ok(find(start, input.known_bytes()).map(|(format, _)| format.name))
+}
+
+/// The format of a file that starts so, and how many bytes stand before it: the mark with which some programs begin UTF-8.
+fn find(start: &[u8], bytes: Option<u64>) -> Option<(&'static Format, usize)> {
+    let find = |start: &[u8]| FORMATS.iter().find(|format| (format.recognises)(start, bytes));
+    match (find(start), start.strip_prefix(b"\xef\xbb\xbf")) {
+        (Some(format), _) => Some((format, 0)),
+        (None, Some(after)) => find(after).map(|format| (format, start.len() - after.len())),
+        (None, None) => None,
+    }
+}
+
 /// As [`open`], for a model that may name other files: materials of OBJ, buffers of glTF.
 ///
 /// # Errors
@@ -56,21 +78,12 @@ pub fn open(source: Box<dyn ByteSource>) -> Result<Box<dyn ModelStream>, ImportE
 pub fn open_with(source: Box<dyn ByteSource>, side: Box<dyn SideFiles>) -> Result<Box<dyn ModelStream>, ImportError> {
     let mut input = Input::new(source)?;
     input.has(START_BYTES)?;
-    let mut start = &input.window()[..input.window().len().min(START_BYTES)];
+    let start = &input.window()[..input.window().len().min(START_BYTES)];
     if start.is_empty() {
         return Err(ImportError::new(Problem::Empty, None));
     }
-    let bytes = input.known_bytes();
-    let find = |start: &[u8]| FORMATS.iter().find(|format| (format.recognises)(start, bytes));
-    let mut format = find(start);
-    if let (None, Some(after)) = (&format, start.strip_prefix(b"\xef\xbb\xbf")) {
-        // The mark with which some programs begin UTF-8.
-        start = after;
-        format = find(start);
-    }
-    match format {
-        Some(format) => {
-            let mark_bytes = input.window().len().min(START_BYTES) - start.len();
+    match find(start, input.known_bytes()) {
+        Some((format, mark_bytes)) => {
             input.consume(mark_bytes);
             (format.open)(input, side)
         }

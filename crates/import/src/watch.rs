@@ -3,7 +3,11 @@
 //! In: a stream, and a way to ask for its source's [`Stamp`]. Out: the same stream, whose end, or first error, is an error
 //! of its own if the stamp is no longer what it was when the source was opened: a file that got shorter is not blamed for it.
 
-use crate::{Attributes, Batch, ByteSource, ImportError, Material, ModelStream, SideFiles, error::Problem, open_with};
+use crate::{
+    Attributes, Batch, ByteSource, ImportError, Material, ModelStream, ReferenceSystem, SideFiles, Texture,
+    error::Problem, open_with,
+};
+use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use std::time::{Duration, SystemTime};
 use std::{fmt, io};
@@ -30,9 +34,22 @@ pub fn open_watched(
     mut ask: AskStamp,
 ) -> Result<Box<dyn ModelStream>, ImportError> {
     let opened = ask().map_err(|source| ImportError::new(Problem::Io { source }, None))?;
+    Watch { opened, ask }.open(source, side)
+}
+
+/// As [`open_watched`], for a source that had the stamp `opened` when it was first looked at.
+///
+/// # Errors
+/// As there; also where it has changed already.
+pub fn open_watched_since(
+    source: Box<dyn ByteSource>,
+    side: Box<dyn SideFiles>,
+    opened: Stamp,
+    ask: AskStamp,
+) -> Result<Box<dyn ModelStream>, ImportError> {
     let mut watch = Watch { opened, ask };
-    let stream = open_with(source, side).map_err(|error| watch.explain(error))?;
-    Ok(Box::new(Watched { stream, watch }))
+    watch.check()?;
+    watch.open(source, side)
 }
 
 struct Watch {
@@ -41,6 +58,15 @@ struct Watch {
 }
 
 impl Watch {
+    fn open(
+        mut self,
+        source: Box<dyn ByteSource>,
+        side: Box<dyn SideFiles>,
+    ) -> Result<Box<dyn ModelStream>, ImportError> {
+        let stream = open_with(source, side).map_err(|error| self.explain(error))?;
+        Ok(Box::new(Watched { stream, watch: self }))
+    }
+
     fn check(&mut self) -> Result<(), ImportError> {
         let now = (self.ask)().map_err(|source| ImportError::new(Problem::Io { source }, None))?;
         if now == self.opened {
@@ -69,8 +95,20 @@ impl ModelStream for Watched {
         self.stream.up_axis()
     }
 
+    fn unit(&self) -> Option<LengthUnit> {
+        self.stream.unit()
+    }
+
+    fn reference_system(&self) -> Option<&ReferenceSystem> {
+        self.stream.reference_system()
+    }
+
     fn materials(&self) -> &[Material] {
         self.stream.materials()
+    }
+
+    fn open_picture(&mut self, material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        self.stream.open_picture(material, texture)
     }
 
     fn declared_vertices(&self) -> Option<u64> {
@@ -198,6 +236,19 @@ mod tests {
         assert_eq!(changed(|bytes| bytes.extend(b"3 0 1 2\n")), message(bytes + 8), "what follows would be ignored");
         assert_eq!(changed(|bytes| *bytes.last_mut().unwrap() = b' '), message(bytes));
         assert_eq!(changed(|bytes| bytes[1_000_000..].fill(b'x')), message(bytes), "not: expected a number");
+    }
+
+    #[test]
+    fn a_file_that_changed_since_it_was_first_looked_at_is_refused_for_that() {
+        let file = file();
+        let [first, asked] = [file.0.lock().unwrap().1, Stamp { bytes: 7, modified: SystemTime::UNIX_EPOCH }];
+        let source = Box::new(Source { file, at: 0 });
+        let opened = open_watched_since(source, Box::new(NoSideFiles), first, Box::new(move || Ok(asked)));
+        let error = opened.err().unwrap().to_string();
+        assert!(
+            error.starts_with("changed while it was read (expected ") && error.contains("found 7 bytes"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -100,6 +100,7 @@ impl<'m> Bvh<'m> {
             |node| slabs.entry(node),
             |triangle| {
                 if let Some(hit) = prepared.meet(self.mesh.corners(triangle))
+                    && self.mesh.is_there(triangle, hit.barycentrics)
                     && best.is_none_or(|best| (hit.t, triangle) < (best.t, best.triangle))
                 {
                     best = Some(SurfaceHit { t: hit.t, triangle, barycentrics: hit.barycentrics });

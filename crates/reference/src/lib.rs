@@ -5,7 +5,7 @@
 //! threads.
 //!
 //! Start at [`Truth::trace`] for what a camera sees, [`judge::judge`] for whether a drawn frame has holes,
-//! [`metrics::compare`] for how far two pictures are apart, and [`distance::two_sided`] for how far two surfaces are.
+//! [`metrics::compare`] and [`delta_e`] for how far two pictures are apart, and [`distance::two_sided`] for how far two surfaces are.
 //!
 //! ```text
 //! Mesh ─▶ Bvh ─┬▶ Truth ─┬▶ shade ─▶ Picture ─▶ metrics, temporal (shimmer)
@@ -15,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bvh;
+pub mod delta_e;
 pub mod discontinuity;
 pub mod distance;
 pub mod distance_transform;
@@ -26,6 +27,7 @@ pub mod poses;
 pub mod raytrace;
 pub mod screen_error;
 pub mod shade;
+pub mod skin;
 pub mod ssim;
 pub mod temporal;
 pub mod triangle;
@@ -38,3 +40,4 @@ pub use mesh::Mesh;
 pub use picture::{Mask, Picture};
 pub use raytrace::Truth;
 pub use shade::Shading;
+pub use skin::Skin;

@@ -6,6 +6,7 @@
 //! Degenerate triangles (zero area, a corner used twice) and unreferenced vertices are ordinary input: the former are
 //! points or segments that a distance can reach and a ray cannot, the latter do not exist as far as the bounds know.
 
+use crate::Skin;
 use gigalod_geom::Aabb;
 use gigalod_geom::color::LINEAR_OF_SRGB8;
 use glam::{DVec3, Vec3};
@@ -21,6 +22,7 @@ pub struct Mesh {
     colors: Option<Vec<[u8; 3]>>,
     triangles: Vec<[u32; 3]>,
     bounds: Aabb,
+    skin: Option<Skin>,
 }
 
 /// Why a mesh was refused.
@@ -45,16 +47,19 @@ pub enum MeshError {
         /// Where it is said to be.
         position: DVec3,
     },
-    /// Normals or colours do not match the vertices one to one.
-    #[error("{found} {attribute} for {vertex_count} vertices")]
+    /// Attributes do not match the vertices, or triangles, one to one.
+    #[error("{found} {attribute} for {vertex_count} {}", if matches!(*.attribute, "normals" | "colors") { "vertices" } else { "triangles" })]
     AttributeCount {
-        /// `"normals"` or `"colors"`.
+        /// `"normals"` or `"colors"` of vertices; `"texture corners"` or `"materials"` of triangles.
         attribute: &'static str,
         /// How many there are.
         found: usize,
         /// How many were expected.
         vertex_count: usize,
     },
+    /// A texture coordinate, material or texture that is not there, or a texture of another size than it says.
+    #[error("a number of the skin names nothing")]
+    Skin,
     /// More triangles than an index can tell apart.
     #[error("{triangle_count} triangles, expected fewer than 2^32 - 1")]
     TooManyTriangles {
@@ -101,7 +106,21 @@ impl Mesh {
             }
         }
         let normals = normals.unwrap_or_else(|| vertex_normals(&positions, &triangles));
-        Ok(Self { positions, normals, colors, triangles, bounds })
+        Ok(Self { positions, normals, colors, triangles, bounds, skin: None })
+    }
+
+    /// The same mesh with materials and textures.
+    ///
+    /// # Errors
+    /// The skin does not fit.
+    pub fn with_skin(self, skin: Skin) -> Result<Self, MeshError> {
+        skin.check(self.triangles.len())?;
+        Ok(Self { skin: Some(skin), ..self })
+    }
+
+    /// False where an alpha mask leaves a point of a triangle out.
+    pub fn is_there(&self, triangle: u32, barycentrics: [f64; 3]) -> bool {
+        self.skin.as_ref().is_none_or(|skin| skin.is_there(triangle, barycentrics))
     }
 
     /// Vertex positions.
@@ -156,17 +175,16 @@ impl Mesh {
     }
 
     /// Interpolated linear RGB; `None` where the mesh has no colours. Each corner is converted to linear light *before*
-    /// the interpolation: it is light that mixes, not code values.
+    /// the interpolation: it is light that mixes, not code values. A skin's colour is a factor to it.
     pub fn linear_color(&self, triangle: u32, barycentrics: [f64; 3]) -> Option<Vec3> {
-        let colors = self.colors.as_ref()?;
-        let corners = self.triangles[triangle as usize];
-        Some(
-            corners
-                .iter()
-                .zip(barycentrics)
-                .map(|(&vertex, weight)| linear_of_srgb8(colors[vertex as usize]) * weight as f32)
-                .sum(),
-        )
+        let of_vertices = self.colors.as_ref().map(|colors| {
+            let corners = self.triangles[triangle as usize].iter().zip(barycentrics);
+            corners.map(|(&vertex, weight)| linear_of_srgb8(colors[vertex as usize]) * weight as f32).sum()
+        });
+        match &self.skin {
+            Some(skin) => Some(of_vertices.unwrap_or(Vec3::ONE) * skin.look(triangle, barycentrics).0),
+            None => of_vertices,
+        }
     }
 }
 

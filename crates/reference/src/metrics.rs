@@ -96,7 +96,7 @@ fn mean_within(values: &[f32], mask: Option<&Mask>) -> f64 {
     if count > 0 { sum / count as f64 } else { 0.0 }
 }
 
-fn compared_pixels<'a>(
+pub(crate) fn compared_pixels<'a>(
     reference: &'a Picture,
     test: &'a Picture,
     mask: Option<&'a Mask>,

@@ -111,6 +111,7 @@ impl Renderer {
     pub fn new(gpu: Gpu) -> Result<Self, RenderError> {
         let light_pass = LightPass::new(&gpu.device);
         let staging = Staging::new(&gpu);
+        let compute_extent_px = keyed::compute_extent_px(&gpu);
         gpu.check()?;
         Ok(Self {
             gpu,
@@ -118,7 +119,7 @@ impl Renderer {
             depth_test_pass: DepthTestPass::default(),
             light_pass,
             budget: None,
-            compute_extent_px: keyed::COMPUTE_EXTENT_PX,
+            compute_extent_px,
             targets: None,
             staging,
             uploaded_bytes: 0,
@@ -434,15 +435,17 @@ impl Buffers {
     }
 
     fn all(&self) -> impl Iterator<Item = &Pool> {
-        let KeyedBuffers { keys, sums, list, draw } = &self.keyed;
+        let KeyedBuffers { keys, found, sums, list, draw } = &self.keyed;
         let chunks = self.chunks.iter().flat_map(|chunk| [&chunk.balls, &chunk.normal_colors]);
-        [keys, sums, list, draw, &self.passes, &self.parts, &self.light, &self.readback].into_iter().chain(chunks)
+        [keys, found, sums, list, draw, &self.passes, &self.parts, &self.light, &self.readback]
+            .into_iter()
+            .chain(chunks)
     }
 
     fn all_mut(&mut self) -> Vec<&mut Pool> {
-        let KeyedBuffers { keys, sums, list, draw } = &mut self.keyed;
+        let KeyedBuffers { keys, found, sums, list, draw } = &mut self.keyed;
         let chunks = self.chunks.iter_mut().flat_map(|chunk| [&mut chunk.balls, &mut chunk.normal_colors]);
-        [keys, sums, list, draw, &mut self.passes, &mut self.parts, &mut self.light, &mut self.readback]
+        [keys, found, sums, list, draw, &mut self.passes, &mut self.parts, &mut self.light, &mut self.readback]
             .into_iter()
             .chain(chunks)
             .collect()

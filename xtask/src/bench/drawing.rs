@@ -11,37 +11,62 @@ const TARGET_MS: &str = "100";
 
 pub(super) fn rows(bench: &Bench, scope: Scope<'_>, rows: &mut Vec<Row>) -> Result<()> {
     let models = models(bench, scope)?;
-    for (name, file) in &models {
-        selection(bench, name, file, rows)?;
-    }
-    for (name, file) in &models {
-        rasterising(bench, name, file, rows)?;
-    }
-    for (name, file) in &models {
-        frame_rate(bench, name, file, rows)?;
+    for part in [selection, rasterising, frame_rate, poses] {
+        for model in &models {
+            part(bench, model, rows)?;
+        }
     }
     shimmer(bench, rows)
 }
 
-/// Names of models and of their files, built.
-fn models(bench: &Bench, scope: Scope<'_>) -> Result<Vec<(&'static str, &'static str)>> {
-    let mut models = vec![("statue, 7 M", "statue7.glod", bench.statue7()?.to_owned())];
+/// Random poses against the ray tracer: what has no triangles is not judged, nor what does not fit into memory as they are.
+fn poses(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> {
+    if !model.judged {
+        return Ok(());
+    }
+    let report = bench.example("gigalod", "poses", &[&model.input, model.file])?;
+    for (kernel, figures) in report["kernels"].as_object().context("kernels")? {
+        let [holes, fat, false_claims] = ["holes", "fat", "false_claims"].map(|key| number(figures, key));
+        rows.push(at_most(
+            format!("{} random poses, {}, {kernel}: holes, fat pixels, false claims", figures["frames"], model.name),
+            holes + fat + false_claims,
+            0.0,
+            &format!("(the tightest claim is needed to {:.0} %)", number(figures, "tightest") * 100.0),
+        ));
+    }
+    Ok(())
+}
+
+/// What is drawn.
+struct Model {
+    name: &'static str,
+    input: String,
+    file: &'static str,
+    /// Whether it can be judged by the ray tracer.
+    judged: bool,
+}
+
+/// All models, built.
+fn models(bench: &Bench, scope: Scope<'_>) -> Result<Vec<Model>> {
+    let model = |name, file, input: &str, judged| Model { name, input: input.to_owned(), file, judged };
+    let mut models = vec![model("statue, 7 M", "statue7.glod", bench.statue7()?, true)];
     let dragons = bench.dragons("dragons10.ply", "10M")?;
-    models.extend(dragons.map(|model| ("dragon, replicated, 10 M", "dragons10.glod", model.to_owned())));
+    models.extend(dragons.map(|input| model("dragon, replicated, 10 M", "dragons10.glod", input, true)));
     let lion = data("points/lion_takanawa_normals.ply");
-    models.extend(lion.map(|path| ("lion, points", "lion.glod", path.to_string_lossy().into_owned())));
+    models.extend(lion.map(|path| model("lion, points", "lion.glod", &path.to_string_lossy(), false)));
     if scope.large {
-        models.push(("statue, 100 M", "statue100.glod", bench.statue100()?.to_owned()));
+        models.push(model("statue, 100 M", "statue100.glod", bench.statue100()?, false));
     }
-    for (_, file, model) in &models {
+    for model in &models {
         // Anew, since the format may have changed.
-        bench.0.gigalod(&["build", model, "-o", file])?;
+        bench.0.gigalod(&["build", &model.input, "-o", model.file])?;
     }
-    Ok(models.into_iter().map(|(name, file, _)| (name, file)).collect())
+    Ok(models)
 }
 
 /// Warm cuts.
-fn selection(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Result<()> {
+fn selection(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> {
+    let Model { name, file, .. } = model;
     let report = bench.example("gigalod-runtime", "select_speed", &[file, "1"])?;
     let cuts = report["cuts"].as_array().context("cuts")?;
     for threads in [1.0, 2.0] {
@@ -63,7 +88,8 @@ fn selection(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Resu
 }
 
 /// Splats through the compute passes and through the pipeline.
-fn rasterising(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Result<()> {
+fn rasterising(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> {
+    let Model { name, file, .. } = model;
     for threshold_px in ["1", "0.5"] {
         let arguments = [file, "--error", threshold_px, "--ways", "compute,quads"];
         let report = bench.example("gigalod", "render_speed", &arguments)?;
@@ -78,7 +104,8 @@ fn rasterising(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Re
 }
 
 /// Frames of a path that is played in real time.
-fn frame_rate(bench: &Bench, name: &str, file: &str, rows: &mut Vec<Row>) -> Result<()> {
+fn frame_rate(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> {
+    let Model { name, file, .. } = model;
     for path in ["walk", "sudden-turn"] {
         bench.0.gigalod(&["synth", "path", path, "--around", file, "-o", "path.json"])?;
         let report = bench.0.gigalod(&["bench", file, "--path", "path.json", "--target-ms", TARGET_MS])?;

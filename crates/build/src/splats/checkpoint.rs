@@ -8,12 +8,13 @@ use super::divide::{Chunks, Division};
 use super::kept::KeptTree;
 use super::leaves::Leaf;
 use super::mesh::{Mesh, Positions};
+use super::paint::Paint;
 use super::points::{Cells, Fits};
 use super::tree::Extent;
 use crate::spool::{Place, Spool};
 use crate::work::Work;
 use bytemuck::Pod;
-use gigalod_format::InputCounts;
+use gigalod_format::{Dicing, InputCounts};
 use gigalod_geom::Aabb;
 use glam::{DVec3, Vec3A};
 use serde::de::DeserializeOwned;
@@ -47,6 +48,7 @@ pub(super) struct Facts {
     pub(super) bounds: Aabb,
     pub(super) closed: bool,
     pub(super) has_colors: bool,
+    pub(super) dicing: Option<Dicing>,
 }
 
 /// Keeps what `stage` has, instead of all that the one before it had.
@@ -54,9 +56,14 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
     let place = Place::Work(work);
     match stage {
         Stage::Start => Ok(()),
-        Stage::Read(Mesh { positions, normals, colors, triangles }) => {
-            let spools = [positions.secure()?, normals.secure()?, colors.secure()?, triangles.secure()?];
-            work.finish("read", spools, Value::Null)
+        Stage::Read(Mesh { positions, normals, colors, triangles, paint }) => {
+            let mut spools = vec![positions.secure()?, normals.secure()?, colors.secure()?, triangles.secure()?];
+            let mut state = Value::Null;
+            if let Some(Paint { looks, pictures, texels, tex_coords, corners, materials }) = paint {
+                spools.extend([texels.secure()?, tex_coords.secure()?, corners.secure()?, materials.secure()?]);
+                state = json!({ "looks": looks, "pictures": pictures });
+            }
+            work.finish("read", spools, state)
         }
         Stage::Cells(facts, cells, fits) => save_fits(work, facts, cells, fits),
         Stage::Leaves(facts, leaves) => work.finish("leaves", [leaves.secure()?], facts.to_json()),
@@ -136,6 +143,17 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
             normals: Spool::reopen(work, "normals")?,
             colors: Spool::reopen(work, "colors")?,
             triangles: Spool::reopen(work, "triangles")?,
+            paint: match &journal.state {
+                Value::Null => None,
+                state => Some(Paint {
+                    looks: of_json(state, "looks").ok_or_else(odd)?,
+                    pictures: of_json(state, "pictures").ok_or_else(odd)?,
+                    texels: Spool::reopen(work, "texels")?,
+                    tex_coords: Spool::reopen(work, "tex_coords")?,
+                    corners: Spool::reopen(work, "tex_corners")?,
+                    materials: Spool::reopen(work, "materials")?,
+                }),
+            },
         }),
         CELLS | FITTING | FITTED => {
             let state = &journal.state["cells"];
@@ -209,6 +227,7 @@ impl Facts {
             "max": self.bounds.max.to_array(),
             "closed": self.closed,
             "has_colors": self.has_colors,
+            "dicing": self.dicing,
         })
     }
 
@@ -220,6 +239,7 @@ impl Facts {
             bounds: Aabb { min: vector("min")?, max: vector("max")? },
             closed: state["closed"].as_bool()?,
             has_colors: state["has_colors"].as_bool()?,
+            dicing: of_json(state, "dicing")?,
         })
     }
 }

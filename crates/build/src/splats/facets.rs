@@ -19,6 +19,8 @@ pub(super) struct Facet {
     pub(super) normal: Vec3,
     /// At its corners, radians.
     pub(super) angles: [f32; 3],
+    /// Area as a share of the square of `radius`.
+    pub(super) area_share: f32,
     /// Six times the volume of the tetrahedron with the anchor.
     pub(super) six_volumes: f32,
 }
@@ -73,6 +75,7 @@ fn block_of(input: &Input) -> ([Facet; LANES], [bool; LANES]) {
     let mut normal = [[0.0; LANES]; 3];
     let mut angles = [[0.0; LANES]; 3];
     let mut volume = [0.0; LANES];
+    let mut area_share = [0.0; LANES];
     let mut are_thin = [false; LANES];
     for lane in 0..LANES {
         // In units of the largest coordinate of its edges, which are then between −1 and 1.
@@ -101,6 +104,8 @@ fn block_of(input: &Input) -> ([Facet; LANES], [bool; LANES]) {
         // What is too wide for `f32` is not a number by now.
         radius[lane] = if rounded >= 0.0 { rounded } else { f32::INFINITY };
 
+        area_share[lane] = 0.5 * twice_area / larger(bounded * bounded, 1e-30);
+
         let is_thin = twice_area <= 1e-2 * long || !has_size;
         are_thin[lane] = is_thin;
         let unit = 1.0 / larger(twice_area, 1e-30);
@@ -121,6 +126,7 @@ fn block_of(input: &Input) -> ([Facet; LANES], [bool; LANES]) {
         radius: radius[lane],
         normal: Vec3::new(normal[0][lane], normal[1][lane], normal[2][lane]),
         angles: [angles[0][lane], angles[1][lane], angles[2][lane]],
+        area_share: area_share[lane],
         six_volumes: volume[lane],
     });
     (facets, are_thin)
@@ -168,6 +174,8 @@ mod tests {
                 let found = f64::from(facet.radius);
                 prop_assert!(found >= exact && found <= exact * 1.0003, "{} {}", found, exact);
                 let cross = (b - a).cross(c - a);
+                let area = f64::from(facet.area_share) * found * found;
+                prop_assert!((area - cross.length() * 0.5).abs() <= 1e-3 * found * found, "{area}");
                 let long = (b - a).length_squared().max((c - a).length_squared());
                 // However thin: a cone must hold it.
                 if let Some(normal) = cross.try_normalize() {

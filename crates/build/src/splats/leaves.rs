@@ -4,11 +4,13 @@
 //! at a triangle's corners cover it (splats paper, section 2.2). The normal is the mesh's own, or else the mean of the
 //! triangles' normals weighted by their angles at the vertex (Thürmer & Wüthrich, *Computing vertex normals from polygonal
 //! facets*, JGT 1998). The cone holds the normals of all triangles around the vertex, seen from the normal as quantised.
+//!
+//! Triangles that are diced (`dice/`) give nothing to their vertices; a vertex of no other triangle is no leaf.
 
-use super::facets::{self, Facet};
+use super::dice::{self, Dice, Kind};
+use super::gather::{FaceNormal, Gathered, Gathering, STRIDE, Survey, for_each_batch, gather, survey};
 use super::join::Corners;
-use super::mesh::{Corner, Mesh, Positions};
-use super::orientation::Orientation;
+use super::mesh::Mesh;
 use super::plan::MemoryPlan;
 use super::reorder;
 use crate::BuildError;
@@ -63,16 +65,7 @@ pub(super) struct Leaves {
     pub(super) bounds: Aabb,
     pub(super) closed: bool,
     pub(super) has_colors: bool,
-}
-
-/// What a vertex gathers from its triangles.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Gathered {
-    /// −1 until the vertex is referenced.
-    radius: f32,
-    /// In steps of 2⁻¹⁶: integers, so that the order of the triangles does not matter.
-    normal: [i32; 3],
+    pub(super) dicing: Option<gigalod_format::Dicing>,
 }
 
 /// How a vertex is oriented.
@@ -85,137 +78,85 @@ struct Aspect {
     spread: u16,
 }
 
-/// A triangle's normal in steps of 1/32767; zero where it has no area.
-type FaceNormal = [i16; 3];
-
-/// Rounded to the nearest: without `round`, which is a call where the processor is not known to have it.
-fn steps_of(value: f32) -> i16 {
-    ((value * 32_767.0 + 32_768.5) as i32 - 32_768) as i16
-}
-
 /// More than the steps of a [`FaceNormal`] can change a cosine by.
-const STEPS: f32 = 6e-5;
+pub(super) const STEPS: f32 = 6e-5;
 
-/// Triangles that add up their volumes one after the other; batches hold whole strides, so that the sum does not depend on them.
-const STRIDE: usize = 4096;
-
-pub(super) fn from_mesh(mut mesh: Mesh, plan: &MemoryPlan<'_>, phases: &Phases<'_>) -> Result<Leaves, BuildError> {
+/// `asked` is the spacing that the user asks for, if any.
+pub(super) fn from_mesh(
+    mut mesh: Mesh,
+    asked: Option<f64>,
+    plan: &MemoryPlan<'_>,
+    phases: &Phases<'_>,
+) -> Result<Leaves, BuildError> {
     let vertex_count = mesh.positions.len();
     phases.begin("radii and normals", mesh.triangles.len());
     reorder::by_space(&mut mesh);
-    let (gathered, faces, orientation) = match &mesh.positions {
-        Positions::Narrow(positions) => gather(&mesh.triangles, positions, plan, phases),
-        Positions::Wide(positions) => gather(&mesh.triangles, positions, plan, phases),
-    }
-    .map_err(BuildError::Scratch)?;
-
-    phases.begin("cones", mesh.triangles.len());
-    let (mut aspects, bounds) = orient(&mesh, &gathered, plan).map_err(BuildError::Scratch)?;
+    let Gathering { mut gathered, mut faces, orientation, sizes } =
+        gather(&mesh, None, plan, phases).map_err(BuildError::Scratch)?;
+    let Survey { bounds, smooth_share } = survey(&mesh, &gathered).map_err(BuildError::Scratch)?;
     let extent = bounds.extent().max_element();
     if extent.is_nan() || extent > 1e30 {
         return Err(BuildError::TooWide { extent });
     }
+    let texels = match &mesh.paint {
+        Some(paint) => paint.count_texels(plan).map_err(BuildError::Scratch)?,
+        None => 0,
+    };
+    let dicing = sizes.dicing(Kind { smooth_share, is_painted: mesh.paint.is_some(), texels }, asked);
+    if let (Some(dicing), Some(spacing)) = (dicing, asked) {
+        let samples = sizes.samples(dicing);
+        if samples >= f64::from(1u32 << 31) {
+            return Err(BuildError::TooFine { spacing, samples });
+        }
+    }
+    if dicing.is_some() {
+        phases.begin("radii and normals of small triangles", mesh.triangles.len());
+        // What was gathered would be in the way of what is.
+        drop((gathered, faces));
+        Gathering { gathered, faces, .. } = gather(&mesh, dicing, plan, phases).map_err(BuildError::Scratch)?;
+    }
+
+    phases.begin("cones", mesh.triangles.len());
+    let mut aspects = orient(&mesh, &gathered, plan).map_err(BuildError::Scratch)?;
     widen_cones(&mesh.triangles, &faces, &mut aspects, plan, phases).map_err(BuildError::Scratch)?;
     drop(faces);
 
-    phases.begin("leaves", vertex_count);
     let origin = bounds.center();
-    let (leaves, has_colors) = collect(mesh, &gathered, &aspects, origin, plan, phases).map_err(BuildError::Scratch)?;
-    Ok(Leaves { leaves, origin, bounds, closed: orientation.is_closed(), has_colors })
-}
-
-/// A batch of triangles, measured; nothing of it is gathered yet.
-#[derive(Default)]
-struct Measured {
-    corners: Corners,
-    strides: Vec<Stride>,
-}
-
-struct Stride {
-    facets: Vec<Facet>,
-    faces: Vec<FaceNormal>,
-    orientation: Orientation,
-}
-
-impl Measured {
-    /// `anchor` is the first corner of all.
-    fn of<C: Corner>(triangles: &[[u32; 3]], positions: &Spool<C>, anchor: &mut Option<C>) -> io::Result<Self> {
-        let (mut corners, mut fetched) = (Corners::of(triangles), Vec::new());
-        corners.fetch(positions, &mut fetched)?;
-        let corner_positions: &[[C; 3]] = fetched.as_chunks().0;
-        let anchor = *anchor.get_or_insert(fetched[0]);
-        let strides = triangles
-            .par_chunks(STRIDE)
-            .zip(corner_positions.par_chunks(STRIDE))
-            .map(|(triangles, corners)| {
-                let (mut facets, mut orientation) = (Vec::new(), Orientation::default());
-                facets::measure(corners, anchor, &mut facets);
-                for (triangle, facet) in triangles.iter().zip(&facets) {
-                    orientation.add(*triangle, facet.six_volumes);
-                }
-                let faces = facets.iter().map(|facet| facet.normal.to_array().map(steps_of)).collect();
-                Stride { facets, faces, orientation }
-            })
-            .collect();
-        Ok(Self { corners, strides })
+    let has_colors = mesh.colors.len() > 0 || mesh.paint.is_some();
+    let (mut samples, mut diced) = (None, None);
+    if let Some(dicing) = dicing {
+        let dice = Dice { mesh: &mesh, dicing, origin };
+        phases.begin("grids", mesh.triangles.len());
+        let count = dice::count(&dice, plan, phases).map_err(BuildError::Scratch)?;
+        plan.expect_leaves(count.cells + vertex_count, mesh.spooled_bytes());
+        phases.begin("dice", count.cells);
+        let mut leaves = Spool::named(&plan.place(), LEAVES).map_err(BuildError::Scratch)?;
+        leaves.expect(count.cells);
+        dice::dice(&dice, &mut leaves, plan, phases).map_err(BuildError::Scratch)?;
+        let (spacing, triangles, samples_made) = (dicing.spacing, count.triangles, leaves.len());
+        diced = Some(gigalod_format::Dicing { spacing, triangles, samples: samples_made });
+        samples = Some(leaves);
     }
-
-    fn gather(mut self, gathered: &mut Spool<Gathered>) -> io::Result<()> {
-        let strides = self.strides;
-        self.corners.fold(gathered, |vertex, corner| {
-            let facet = &strides[corner / (3 * STRIDE)].facets[corner / 3 % STRIDE];
-            vertex.radius = vertex.radius.max(facet.radius);
-            let normal = (facet.normal * (facet.angles[corner % 3] * 65_536.0)).to_array();
-            for (sum, value) in vertex.normal.iter_mut().zip(normal) {
-                *sum = sum.wrapping_add(value as i32);
-            }
-        })
+    phases.begin("leaves", vertex_count);
+    let leaves = collect(mesh, &gathered, &aspects, samples, origin, plan, phases).map_err(BuildError::Scratch)?;
+    match leaves.len() {
+        // All is masked out.
+        0 => Err(BuildError::Nothing),
+        found if found >= 1 << 31 => Err(BuildError::TooManyVertices { found }),
+        _ => Ok(Leaves { leaves, origin, bounds, closed: orientation.is_closed(), has_colors, dicing: diced }),
     }
 }
 
-/// First look at all triangles: each vertex' radius and normal, each triangle's normal, and whether all is closed.
-fn gather<C: Corner>(
-    triangles: &Spool<[u32; 3]>,
-    positions: &Spool<C>,
-    plan: &MemoryPlan<'_>,
-    phases: &Phases<'_>,
-) -> io::Result<(Spool<Gathered>, Spool<FaceNormal>, Orientation)> {
-    let mut gathered = Spool::new(&plan.place())?;
-    fill(&mut gathered, positions.len(), Gathered { radius: -1.0, normal: [0; 3] })?;
-    let mut faces = Spool::new(&plan.place())?;
-    faces.expect(triangles.len());
-    let mut orientation = Orientation::default();
-    let mut anchor = None;
-    // While a batch is measured, the one before it is gathered.
-    let mut measured = Measured::default();
-    for_each_batch(triangles, plan, |start, triangles| {
-        let before = std::mem::take(&mut measured);
-        let (gathering, measuring) =
-            rayon::join(|| before.gather(&mut gathered), || Measured::of(triangles, positions, &mut anchor));
-        gathering?;
-        measured = measuring?;
-        for Stride { faces: normals, orientation: stride, .. } in &measured.strides {
-            faces.push(normals)?;
-            orientation.merge(stride);
-        }
-        phases.at(start);
-        Ok(())
-    })?;
-    measured.gather(&mut gathered)?;
-    Ok((gathered, faces, orientation))
-}
+/// Name of the spool.
+const LEAVES: &str = "leaves";
 
-/// The normal of each vertex: its own where it has one, else what it gathered; and the bounds of all that are referenced.
-fn orient(mesh: &Mesh, gathered: &Spool<Gathered>, plan: &MemoryPlan<'_>) -> io::Result<(Spool<Aspect>, Aabb)> {
+/// The normal of each vertex: its own where it has one, else what it gathered.
+fn orient(mesh: &Mesh, gathered: &Spool<Gathered>, plan: &MemoryPlan<'_>) -> io::Result<Spool<Aspect>> {
     let mut aspects = Spool::new(&plan.place())?;
     aspects.expect(gathered.len());
-    let mut bounds = Aabb::EMPTY;
     let has_own = mesh.normals.len() > 0;
-    let (mut own, mut at) = (Vec::new(), Vec::new());
+    let mut own = Vec::new();
     gathered.for_each_piece(MemoryPlan::PIECE, |start, gathered| {
-        mesh.positions.read_vec(start, gathered.len(), &mut at)?;
-        let referenced = at.iter().zip(gathered).filter(|(_, gathered)| gathered.radius >= 0.0);
-        bounds = referenced.fold(bounds, |bounds, (position, _)| bounds.including(*position));
         if has_own {
             mesh.normals.read_vec(start, gathered.len(), &mut own)?;
         }
@@ -227,7 +168,7 @@ fn orient(mesh: &Mesh, gathered: &Spool<Gathered>, plan: &MemoryPlan<'_>) -> io:
         };
         aspects.push(&gathered.par_iter().with_min_len(1 << 12).enumerate().map(aspect).collect::<Vec<_>>())
     })?;
-    Ok((aspects, bounds))
+    Ok(aspects)
 }
 
 /// Second look at all triangles: how far their normals are from their vertices'.
@@ -263,19 +204,26 @@ fn widen_cones(
     })
 }
 
-/// Leaves of all referenced vertices, in their order; and whether they have colours.
+/// Leaves of all referenced vertices, in their order, after those of samples, if any.
 fn collect(
     mesh: Mesh,
     gathered: &Spool<Gathered>,
     aspects: &Spool<Aspect>,
+    samples: Option<Spool<Leaf>>,
     origin: DVec3,
     plan: &MemoryPlan<'_>,
     phases: &Phases<'_>,
-) -> io::Result<(Spool<Leaf>, bool)> {
-    let Mesh { positions, normals, colors, triangles } = mesh;
-    drop((normals, triangles));
+) -> io::Result<Spool<Leaf>> {
+    let Mesh { positions, normals, colors, triangles, paint } = mesh;
+    let is_painted = paint.is_some();
+    drop((normals, triangles, paint));
     let has_colors = colors.len() > 0;
-    let mut leaves = Spool::named(&plan.place(), "leaves")?;
+    let mut leaves = match samples {
+        // No triangle is left to vertices.
+        Some(leaves) if is_painted => return Ok(leaves),
+        Some(leaves) => leaves,
+        None => Spool::named(&plan.place(), LEAVES)?,
+    };
     leaves.expect(positions.len());
     let (mut at, mut aspect, mut color) = (Vec::new(), Vec::new(), Vec::new());
     gathered.for_each_piece(MemoryPlan::PIECE, |start, gathered| {
@@ -299,29 +247,5 @@ fn collect(
         phases.at(start + gathered.len() as u64);
         Ok(())
     })?;
-    Ok((leaves, has_colors))
-}
-
-/// All triangles, as many at a time as the plan allows, in whole strides.
-fn for_each_batch(
-    triangles: &Spool<[u32; 3]>,
-    plan: &MemoryPlan<'_>,
-    mut visit: impl FnMut(u64, &[[u32; 3]]) -> io::Result<()>,
-) -> io::Result<()> {
-    // In memory more than this at a time gains nothing and leaves the cache.
-    let at_once = plan.triangles_at_once().min(if plan.is_in_memory() { 1 << 15 } else { usize::MAX });
-    let at_once = (at_once / STRIDE).max(1) * STRIDE;
-    triangles.for_each_piece(at_once, |start, piece| visit(start, piece))
-}
-
-fn fill<T: bytemuck::Pod>(spool: &mut Spool<T>, count: u64, record: T) -> io::Result<()> {
-    spool.expect(count);
-    let piece: Vec<T> = std::iter::repeat_n(record, MemoryPlan::PIECE).collect();
-    let mut left = count;
-    while left > 0 {
-        let now = left.min(piece.len() as u64);
-        spool.push(&piece[..now as usize])?;
-        left -= now;
-    }
-    Ok(())
+    Ok(leaves)
 }

@@ -1,5 +1,6 @@
 //! The whole mesh, read from a stream once, in memory or spooled to disk.
 
+use super::paint::{Paint, Reading};
 use super::plan::MemoryPlan;
 use crate::BuildError;
 use crate::journal::Extent;
@@ -126,6 +127,17 @@ pub(super) struct Mesh {
     /// 8-bit sRGB, one for each vertex, or empty.
     pub(super) colors: Spool<[u8; 3]>,
     pub(super) triangles: Spool<[u32; 3]>,
+    /// Where materials or textures have colours.
+    pub(super) paint: Option<Paint>,
+}
+
+impl Mesh {
+    /// Bytes of the spools, but for pictures.
+    pub(super) fn spooled_bytes(&self) -> u64 {
+        let per_vertex = 24 * self.positions.len() + 12 * self.normals.len() + 3 * self.colors.len();
+        let of_paint = |paint: &Paint| 8 * paint.tex_coords.len() + 16 * paint.corners.len();
+        per_vertex + 12 * self.triangles.len() + self.paint.as_ref().map_or(0, of_paint)
+    }
 }
 
 pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phases<'_>) -> Result<Mesh, BuildError> {
@@ -136,7 +148,9 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
         normals: Spool::named(&place, "normals").map_err(BuildError::Scratch)?,
         colors: Spool::named(&place, "colors").map_err(BuildError::Scratch)?,
         triangles: Spool::named(&place, "triangles").map_err(BuildError::Scratch)?,
+        paint: None,
     };
+    let mut paint = Reading::new(place);
     if let (Some(vertices), Some(faces)) = (input.declared_vertices(), input.declared_faces()) {
         // A header's word, believed only as far as the plan found room for it.
         mesh.positions.expect(vertices.min(plan.most_vertices()));
@@ -151,7 +165,8 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
             mesh.positions.push(&batch.vertices.positions, &place)?;
             mesh.normals.push(&normals)?;
             mesh.colors.push(&batch.vertices.colors)?;
-            mesh.triangles.push(&batch.triangles)
+            mesh.triangles.push(&batch.triangles)?;
+            paint.push(&batch)
         };
         push().map_err(BuildError::Scratch)?;
         phases.at(input.bytes_consumed().0);
@@ -161,6 +176,9 @@ pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phas
     }
     if mesh.positions.len() >= 1 << 31 {
         return Err(BuildError::TooManyVertices { found: mesh.positions.len() });
+    }
+    if mesh.triangles.len() > 0 {
+        mesh.paint = paint.finish(input, plan, phases)?;
     }
     Ok(mesh)
 }

@@ -4,11 +4,12 @@
 //!
 //! ```text
 //! mesh ──▶ leaves ──▶ divide ──▶ chunk: tree, contract, kept ──▶ quantise: lower ──▶ layout ──▶ pages
-//! stream   facets,    chunks of  binary,  2–4       measured     codes, top-down;    order of   coded
+//! stream   gather,    chunks of  binary,  2–4       measured     codes, top-down;    order of   coded
 //!          join       65,536     midpoint children               by size            the file
 //! ```
 //!
-//! A model without triangles is a point cloud: its leaves come from `points/`.
+//! A model without triangles is a point cloud: its leaves come from `points/`. Large triangles are cut into cells, each a leaf
+//! (`dice/`), and so are those whose colours are not their vertices' (`paint/`).
 //!
 //! What grows with the model lies in spools, in memory or on disk as `plan.rs` decides; the rest is the size of a chunk. On
 //! disk, `checkpoint.rs` makes of the end of each step a place to continue from.
@@ -21,8 +22,10 @@ mod below;
 mod checkpoint;
 mod chunk;
 mod contract;
+mod dice;
 mod divide;
 mod facets;
+mod gather;
 mod join;
 mod kept;
 mod layout;
@@ -32,6 +35,7 @@ mod measure;
 mod mesh;
 mod orientation;
 mod pages;
+mod paint;
 mod plan;
 mod points;
 mod quantise;
@@ -47,7 +51,7 @@ use crate::{BuildError, Options};
 use checkpoint::{Facts, Stage};
 use divide::Division;
 use gigalod_format::splats::{Root, Skeleton};
-use gigalod_format::{Bounds, InputCounts, Kind, Metadata};
+use gigalod_format::{Bounds, InputCounts, Kind, Metadata, ReferenceSystem};
 use gigalod_import::ModelStream;
 use plan::MemoryPlan;
 use std::collections::BTreeMap;
@@ -75,8 +79,18 @@ pub fn build(
         .map_err(|error| BuildError::Threads(error.to_string()))?;
 
     let up = options.up.unwrap_or(input.up_axis());
-    let influential =
+    let unit = options.unit.or(input.unit());
+    let mut influential =
         BTreeMap::from([("as".into(), Kind::Splats.name().into()), ("up".into(), format!("{up:?}").to_lowercase())]);
+    influential.extend(unit.map(|unit| ("units".into(), unit.symbol().into())));
+    let reference_system = input.reference_system().map(|system| ReferenceSystem {
+        name: system.name.clone(),
+        epsg: system.epsg,
+        wkt: system.wkt.clone(),
+    });
+    if let Some(spacing) = options.spacing {
+        influential.insert("spacing".into(), spacing.to_string());
+    }
     let in_memory = plan::fits_into_memory(options, &*input);
     let work = match &options.input {
         Some(identity) => {
@@ -92,7 +106,7 @@ pub fn build(
         None => (Output::create(out), Place::Folder(folder_of(out))),
     };
     let output = output.map_err(BuildError::Output)?;
-    let plan = MemoryPlan::new(options, place);
+    let plan = MemoryPlan::new(options, place, folder_of(out));
 
     let mut input = Some(input);
     let (mut stage, resumed_after) = checkpoint::load(work.as_ref()).map_err(BuildError::Scratch)?;
@@ -118,9 +132,9 @@ pub fn build(
             }
             Stage::Read(mesh) => {
                 let counts = InputCounts { triangles: mesh.triangles.len(), vertices: mesh.positions.len(), points: 0 };
-                let leaves = workers.install(|| leaves::from_mesh(mesh, &plan, &phases))?;
-                let leaves::Leaves { leaves, origin, bounds, closed, has_colors } = leaves;
-                Stage::Leaves(Facts { counts, origin, bounds, closed, has_colors }, leaves)
+                let leaves = workers.install(|| leaves::from_mesh(mesh, options.spacing, &plan, &phases))?;
+                let leaves::Leaves { leaves, origin, bounds, closed, has_colors, dicing } = leaves;
+                Stage::Leaves(Facts { counts, origin, bounds, closed, has_colors, dicing }, leaves)
             }
             Stage::Leaves(facts, leaves) => {
                 Stage::Dividing(facts, Division::new(leaves, &plan).map_err(BuildError::Scratch)?)
@@ -140,7 +154,7 @@ pub fn build(
         }
     };
     drop(input);
-    let Facts { counts, origin, bounds, closed, has_colors } = facts;
+    let Facts { counts, origin, bounds, closed, has_colors, dicing } = facts;
     let quantised = workers.install(|| quantise::top_down(chunks, &plan, &phases)).map_err(BuildError::Scratch)?;
     let pages::Written { writer, pages, model, nodes, levels, raw_bytes } =
         workers.install(|| pages::write(&quantised, output.file(), &phases)).map_err(BuildError::Output)?;
@@ -160,6 +174,9 @@ pub fn build(
     if has_colors {
         attributes.push("colors".into());
     }
+    if let Some(dicing) = dicing {
+        influential.insert("spacing".into(), dicing.spacing.to_string());
+    }
     let skeleton = Skeleton::encode(&root, &pages, model.as_ref());
     let metadata = Metadata {
         generator: GENERATOR.into(),
@@ -171,7 +188,9 @@ pub fn build(
         raw_bytes: raw_bytes + skeleton.len() as u64,
         closed,
         bounds: Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() },
+        reference_system,
         attributes,
+        dicing,
         per_level: levels,
     };
     let (buffer, output_bytes) = writer.finish(&skeleton, &metadata).map_err(BuildError::Output)?;

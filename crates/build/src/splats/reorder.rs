@@ -21,6 +21,10 @@ pub(super) fn by_space(mesh: &mut Mesh) {
     else {
         return;
     };
+    // What triangles carry would have to move with them, and nothing is gathered from them that could gain by it.
+    if mesh.paint.is_some() {
+        return;
+    }
     if is_local(triangles, positions.len()) {
         return;
     }
@@ -140,6 +144,7 @@ mod tests {
             normals: Spool::new(&Place::Memory).unwrap(),
             colors: Spool::new(&Place::Memory).unwrap(),
             triangles: Spool::new(&Place::Memory).unwrap(),
+            paint: None,
         };
         let Positions::Narrow(narrow) = &mut mesh.positions else { unreachable!() };
         narrow.push(&positions).unwrap();

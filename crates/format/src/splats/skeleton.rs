@@ -129,13 +129,16 @@ impl Skeleton {
         let (levels, flags, model_bytes) = (fields.u32(), fields.u32(), fields.u32());
         if !origin.is_finite() || !bounds.min.is_finite() || !bounds.max.is_finite() || bounds.is_empty() {
             return Err(invalid(format!(
-                "an origin at {origin} and bounds from {} to {}, expected finite numbers, the smaller first",
-                bounds.min, bounds.max
+                "an origin at {} and bounds from {} to {}, expected finite numbers, the smaller first",
+                shown(origin),
+                shown(bounds.min),
+                shown(bounds.max)
             )));
         }
         if !center.is_finite() || !(0.0..=f32::MAX).contains(&radius) || !(1.0..=64.0).contains(&overhang) {
             return Err(invalid(format!(
-                "a root sphere at {center} with radius {radius} and overhang {overhang}, expected finite numbers, a radius ≥ 0, an overhang of 1–64"
+                "a root sphere at {} with radius {radius:e} and overhang {overhang:e}, expected finite numbers, a radius ≥ 0, an overhang of 1–64",
+                shown(center.as_dvec3())
             )));
         }
         let Some(record_bytes) = (bytes.len() - ROOT_BYTES).checked_sub(model_bytes as usize) else {
@@ -222,4 +225,9 @@ impl Skeleton {
     pub fn page_offset(&self, page: PageId) -> u64 {
         self.offsets[page.0 as usize]
     }
+}
+
+/// In a line of bounded length, whatever the numbers.
+fn shown(place: DVec3) -> String {
+    format!("({:e}, {:e}, {:e})", place.x, place.y, place.z)
 }

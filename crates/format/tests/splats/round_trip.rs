@@ -6,7 +6,7 @@ use gigalod_format::splats::page::MAX_NODES;
 use gigalod_format::splats::{
     Children, FamilyPlace, Link, Node, Page, PageContents, PageId, PageRecord, SplatFile, WordIndex,
 };
-use gigalod_format::{Bounds, Container, FileStore, MemoryStore, Metadata, PageStore};
+use gigalod_format::{Bounds, Container, FileStore, MemoryStore, Metadata, PageStore, ReferenceSystem};
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -82,6 +82,16 @@ proptest! {
         let tree = Tree::grow(1, Growth::Oldest, false, &mut Random(1));
         let [a, b, c, d, e, f] = bounds;
         let metadata = Metadata { bounds: Bounds { min: [a, b, c], max: [d, e, f] }, ..metadata(&tree) };
+        let file = open(&tree.write_with(Layout::default(), &root(&tree), &metadata)).unwrap();
+        prop_assert_eq!(file.container().read_metadata().unwrap(), metadata);
+    }
+
+    #[test]
+    fn a_reference_system_survives_the_metadata_and_may_be_missing(
+        name in prop::option::of(any::<String>()), epsg in prop::option::of(any::<u32>()), wkt in prop::option::of(any::<String>()),
+    ) {
+        let tree = Tree::grow(1, Growth::Oldest, false, &mut Random(1));
+        let metadata = Metadata { reference_system: Some(ReferenceSystem { name, epsg, wkt }), ..metadata(&tree) };
         let file = open(&tree.write_with(Layout::default(), &root(&tree), &metadata)).unwrap();
         prop_assert_eq!(file.container().read_metadata().unwrap(), metadata);
     }

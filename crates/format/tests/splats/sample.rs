@@ -73,7 +73,9 @@ fn sample() -> (Tree, Root, Metadata) {
         raw_bytes: 144 + 58,
         closed: false,
         bounds: Bounds { min: root.bounds.min.to_array(), max: root.bounds.max.to_array() },
+        reference_system: None,
         attributes: vec!["normals".into(), "colors".into()],
+        dicing: None,
         per_level: vec![level(0, 1, 6, 26.0), level(1, 2, 13, 16.0), level(2, 4, 26, 7.384_615_421_295_166)],
     };
     (tree, root, metadata)

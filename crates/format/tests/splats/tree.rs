@@ -247,7 +247,9 @@ pub(crate) fn metadata(tree: &Tree) -> Metadata {
         raw_bytes: 1,
         closed: root.closed,
         bounds: Bounds { min: root.bounds.min.to_array(), max: root.bounds.max.to_array() },
+        reference_system: None,
         attributes: vec!["normals".into()],
+        dicing: None,
         per_level: Vec::new(),
     }
 }

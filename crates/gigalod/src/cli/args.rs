@@ -2,7 +2,7 @@
 
 use super::parse;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use gigalod_geom::ImageSize;
+use gigalod_geom::{ImageSize, LengthUnit};
 use gigalod_render::Kernel;
 use glam::DVec3;
 use std::path::PathBuf;
@@ -41,10 +41,13 @@ pub(crate) enum Command {
 ///
 /// Reads meshes (PLY, OBJ, STL, OFF, glTF and GLB) and clouds of points (PLY, LAS and LAZ, E57, PCD, PTS, XYZ), told apart by
 /// their content; text formats, PLY, STL and LAS also gzipped. The output appears under its name only when it is complete.
+/// Several files become one model, in the coordinates that they have; all of them meshes, or all of them clouds. A folder stands
+/// for the models in it.
 #[derive(Args, Debug)]
-#[command(after_help = "Example:\n  gigalod build statue.ply.gz -o statue.glod")]
+#[command(after_help = "Examples:\n  gigalod build statue.ply.gz -o statue.glod\n  \
+    gigalod build tiles/ more.laz --units us-ft -o county.glod")]
 pub(crate) struct BuildArgs {
-    /// Model to convert
+    /// Models to convert, files or folders: together one model
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// File to write; replaced if it exists
@@ -56,10 +59,15 @@ pub(crate) struct BuildArgs {
     /// Which way is up [default: as the format has it]
     #[arg(long, value_enum)]
     pub(crate) up: Option<UpAxisArg>,
+    /// What a length of 1 in the input is: m, mm, cm, km, ft, us-ft or in [default: what the input says, if anything]
+    ///
+    /// It is kept for `info` and `verify` to show. Coordinates, and all lengths in options and reports, stay in this unit.
+    #[arg(long, value_parser = parse::unit, value_name = "UNIT")]
+    pub(crate) units: Option<LengthUnit>,
     /// Continue a build that was interrupted, if there is one
     ///
     /// A build that does not fit into half of --memory works in a folder beside the output, .NAME.glod.build, and can go on
-    /// there after anything: with the same input, --as and --up, or it is refused; --memory and --threads may differ. Without
+    /// there after anything: with the same input, --as, --up, --units and --spacing, or it is refused; --memory and --threads may differ. Without
     /// --resume what is there is removed and the build starts anew. The folder takes up to three times the input's size.
     #[arg(long)]
     pub(crate) resume: bool,
@@ -75,6 +83,13 @@ pub(crate) struct BuildOptions {
     /// Worker threads [default: one for each core]
     #[arg(long, default_value = "0", hide_default_value = true, value_parser = parse::threads, value_name = "N")]
     pub(crate) threads: usize,
+    /// Sample triangles that are larger than this so finely, in the model's units [default: what suits the model]
+    ///
+    /// Of a scan, only what is out of all proportion is cut by default; of anything else, such as a building, so much that there
+    /// are about 2 million samples, or one a triangle if these are more. Smaller takes more time and room, and looks sharper
+    /// close up.
+    #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "UNITS")]
+    pub(crate) spacing: Option<f64>,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
@@ -279,10 +294,10 @@ pub(crate) struct InfoArgs {
 pub(crate) struct VerifyArgs {
     /// File to check
     pub(crate) file: PathBuf,
-    /// The model it was built from: also measure that each decoded sphere encloses what it stands for, and how far what is
-    /// drawn lies from the surface
-    #[arg(long, value_name = "ORIGINAL")]
-    pub(crate) against: Option<PathBuf>,
+    /// The model it was built from, files or folders: also measure that each decoded sphere encloses what it stands for, and how
+    /// far what is drawn lies from the surface
+    #[arg(long, value_name = "ORIGINAL", num_args = 1..)]
+    pub(crate) against: Vec<PathBuf>,
 }
 
 /// Measure how different two pictures of the same size are: PSNR, SSIM, FLIP, largest difference

@@ -3,6 +3,7 @@
 use super::args::{BuildArgs, BuildOptions, UpAxisArg};
 use super::error::{CliError, Outcome};
 use super::files;
+use super::inputs::{Inputs, Sense};
 use super::parse::readable_bytes;
 use super::progress::Console;
 use super::usage::Usage;
@@ -40,26 +41,21 @@ struct PhaseReport {
 }
 
 pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliError> {
-    let [input] = &args.inputs[..] else {
-        return Err(CliError::usage(format!("{} inputs, expected one", args.inputs.len()))
-            .hint("several files as one model are not supported yet"));
-    };
-    files::check_output(&args.output, &[input])?;
+    let inputs = Inputs::find(&args.inputs, console)?;
+    files::check_output(&args.output, &inputs.files())?;
     let usage = Usage::watch();
     let recovery = if args.resume { Recovery::Resume } else { Recovery::Keep };
-    let report = build(input, &args.output, &args.options, args.up.map(UpAxis::from), recovery, console)?;
+    let sense = Sense { up: args.up.map(UpAxis::from), unit: args.units };
+    let report = build(&inputs, &args.output, &args.options, sense, recovery, console)?;
     let (seconds, cpu_seconds) = usage.seconds();
     let metadata = &report.metadata;
     if metadata.leaves < FEW_VERTICES {
         let what = if metadata.input.points > 0 {
             format!("only {} points; splats are made for dense scans", metadata.leaves)
         } else {
-            format!(
-                "only {} vertices; splats are made for dense scans, large triangles become large discs",
-                metadata.leaves
-            )
+            format!("only {} vertices; splats are made for dense scans", metadata.leaves)
         };
-        console.warn(&CliError::in_file(input, what));
+        console.warn(&CliError::in_file(inputs.name(), what));
     }
     let json = BuildReport {
         kind: "splats",
@@ -75,8 +71,12 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         phases: report.phases.iter().map(|phase| PhaseReport { name: phase.name, seconds: phase.seconds }).collect(),
         resumed_after: report.resumed_after.as_deref(),
     };
+    let diced = match metadata.dicing {
+        Some(dicing) => format!(" (of {} diced triangles {})", dicing.triangles, dicing.samples),
+        None => String::new(),
+    };
     let text = format!(
-        "{}: {} as {} splats on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
+        "{}: {} as {} splats{diced} on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
         args.output.display(),
         match metadata.input {
             InputCounts { points, triangles: 0, .. } => format!("{points} points"),
@@ -113,27 +113,29 @@ pub(crate) enum Recovery {
 /// Said where there is something to continue.
 pub(crate) const CONTINUE: &str = "continue with --resume";
 
-/// Builds one model into one file, with progress.
+/// Builds a model into a file, with progress.
 pub(crate) fn build(
-    input: &Path,
+    inputs: &Inputs,
     output: &Path,
     options: &BuildOptions,
-    up: Option<UpAxis>,
+    sense: Sense,
     recovery: Recovery,
     console: &Console,
 ) -> Result<Report, CliError> {
-    let (stream, identity) = files::open_input(input)?;
+    let (stream, identity) = inputs.open(sense)?;
     let options = Options {
         memory_bytes: options.memory,
         threads: options.threads,
-        up,
+        up: sense.up,
+        unit: sense.unit,
+        spacing: options.spacing,
         input: (recovery != Recovery::Lost).then_some(identity),
         resume: recovery == Recovery::Resume,
     };
-    let work = console.work(&input.file_name().unwrap_or_default().to_string_lossy());
+    let work = console.work(&inputs.name().file_name().unwrap_or_default().to_string_lossy());
     gigalod_build::splats::build(stream, &options, &work, output).map_err(|error| {
         let is_ours = !matches!(error, BuildError::Busy { .. } | BuildError::OtherBuild { .. });
-        let error = CliError::build(input, output, &error);
+        let error = CliError::build(inputs.name(), output, &error);
         let stays = is_ours && recovery != Recovery::Lost && gigalod_build::can_continue(output);
         if stays { error.hint(CONTINUE) } else { error }
     })

@@ -3,6 +3,7 @@
 use super::args::{BuildOptions, DemoArgs};
 use super::build::{Recovery, build};
 use super::error::{CliError, Outcome};
+use super::inputs::{Inputs, Sense};
 use super::parse::readable_bytes;
 use super::progress::Console;
 use super::render::Job;
@@ -77,8 +78,8 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliErro
     let _ = writeln!(text, "{}: {} triangles, {}", scan.display(), statue.triangles, readable_bytes(statue.bytes));
 
     let built = folder.join("statue.glod");
-    let build_options = BuildOptions { memory: 2 << 30, threads: 0 };
-    let report = build(&scan, &built, &build_options, None, Recovery::Lost, console)?;
+    let build_options = BuildOptions { memory: 2 << 30, threads: 0, spacing: None };
+    let report = build(&Inputs::one(&scan), &built, &build_options, Sense::default(), Recovery::Lost, console)?;
     let _ = writeln!(text, "{}: {}", built.display(), readable_bytes(report.output_bytes));
 
     let mut stage = Stage::open(&Subject::of_container(&built)?, Budgets { cpu: 1 << 30, gpu: None })?;

@@ -2,7 +2,7 @@
 
 use gigalod_build::BuildError;
 use gigalod_format::FormatError;
-use gigalod_import::ImportError;
+use gigalod_import::{ImportError, Problem, Shared};
 use serde::Serialize;
 use std::path::Path;
 use std::{fmt, io};
@@ -71,7 +71,14 @@ impl CliError {
     }
 
     pub(crate) fn import(file: &Path, error: &ImportError) -> Self {
-        Self { place: error.place().map(ToString::to_string), ..Self::in_file(file, error.what()) }
+        let file = error.file().map_or(file, Path::new);
+        let wrong = Self { place: error.place().map(ToString::to_string), ..Self::in_file(file, error.what()) };
+        match error.what() {
+            Problem::Differs { what: Shared::Up, .. } => wrong.hint("say which way is up in all of them, as --up z"),
+            Problem::Differs { what: Shared::Unit, .. } => wrong.hint("say what it is in all of them, as --units m"),
+            Problem::Differs { what: Shared::Kind, .. } => wrong.hint("build meshes and point clouds apart"),
+            _ => wrong,
+        }
     }
 
     pub(crate) fn format(file: &Path, error: &FormatError) -> Self {

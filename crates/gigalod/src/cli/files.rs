@@ -1,7 +1,7 @@
 //! Opening and writing files.
 
 use super::error::CliError;
-use gigalod_build::InputIdentity;
+use gigalod_build::FileIdentity;
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, FileStore};
 use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
@@ -16,22 +16,25 @@ pub(crate) fn open_model(path: &Path) -> Result<Box<dyn ModelStream>, CliError> 
 }
 
 /// Opens a raw model, and says which it is.
-pub(crate) fn open_input(path: &Path) -> Result<(Box<dyn ModelStream>, InputIdentity), CliError> {
+pub(crate) fn open_input(path: &Path) -> Result<(Box<dyn ModelStream>, FileIdentity), CliError> {
     let wrong = |error: io::Error| CliError::in_file(path, error);
     let file = open(path)?;
-    let identity = InputIdentity::of(path, &file).map_err(wrong)?;
+    let identity = FileIdentity::of(path, &file).map_err(wrong)?;
     let watched = file.try_clone().map_err(wrong)?;
-    let ask = move || {
-        let metadata = watched.metadata()?;
-        Ok(Stamp { bytes: metadata.len(), modified: metadata.modified()? })
-    };
-    let stream = gigalod_import::open_watched(Box::new(file), side_files(path), Box::new(ask))
+    let ask = Box::new(move || stamp(&watched));
+    let stream = gigalod_import::open_watched(Box::new(file), side_files(path), ask)
         .map_err(|error| CliError::import(path, &error))?;
     Ok((stream, identity))
 }
 
+/// What changes when a file is written to.
+pub(crate) fn stamp(file: &File) -> io::Result<Stamp> {
+    let metadata = file.metadata()?;
+    Ok(Stamp { bytes: metadata.len(), modified: metadata.modified()? })
+}
+
 /// Opens files that a model names: only those in its folder and below, since a model may come from anywhere.
-fn side_files(path: &Path) -> Box<dyn SideFiles> {
+pub(crate) fn side_files(path: &Path) -> Box<dyn SideFiles> {
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     Box::new(move |name: &str| -> io::Result<Box<dyn ByteSource>> {
         // Programs for Windows write its separators.
@@ -93,8 +96,9 @@ pub(crate) fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), CliErr
     if !metadata.is_file() && !metadata.is_dir() {
         return Err(CliError::in_file(output, "not a regular file: it would be replaced"));
     }
-    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
-    if inputs.iter().any(|input| same(input, output)) {
+    let output_is = output.canonicalize().ok();
+    let is_same = |input: &Path| output_is.is_some() && input.canonicalize().ok() == output_is;
+    if inputs.iter().any(|input| is_same(input)) {
         return Err(CliError::in_file(output, "input and output are the same file"));
     }
     Ok(())

@@ -5,7 +5,7 @@ use super::error::{CliError, Outcome};
 use super::files;
 use super::parse::readable_bytes;
 use super::progress::Console;
-use gigalod_format::{Bounds, InputCounts, LevelSummary};
+use gigalod_format::{Bounds, Dicing, InputCounts, LevelSummary, ReferenceSystem};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -24,6 +24,9 @@ struct InfoReport<'a> {
     raw_bytes: u64,
     closed: bool,
     bounds: Bounds,
+    dicing: Option<Dicing>,
+    units: Option<&'a str>,
+    reference_system: Option<&'a ReferenceSystem>,
     attributes: &'a [String],
     per_level: &'a [LevelSummary],
 }
@@ -46,14 +49,15 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
         raw_bytes: metadata.raw_bytes,
         closed: metadata.closed,
         bounds: metadata.bounds,
+        dicing: metadata.dicing,
+        units: metadata.options.get("units").map(String::as_str),
+        reference_system: metadata.reference_system.as_ref(),
         attributes: &metadata.attributes,
         per_level: &metadata.per_level,
     };
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
-        // Some values are a stranger's words: they shall not steer the terminal.
-        let value: String = value.chars().filter(|c| !c.is_control()).collect();
-        let _ = writeln!(text, "{name:<12}{value}");
+        let _ = writeln!(text, "{name:<12}{}", shown(&value));
     };
     line("kind", format!("{} (format version {})", container.kind().name(), gigalod_format::VERSION));
     line("built by", metadata.generator.clone());
@@ -64,6 +68,9 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
             InputCounts { triangles, vertices, .. } => format!("{triangles} triangles, {vertices} vertices"),
         },
     );
+    if let Some(Dicing { spacing, triangles, samples }) = metadata.dicing {
+        line("diced", format!("{triangles} triangles into {samples} samples, each for at most a square of {spacing}"));
+    }
     for (name, value) in &metadata.options {
         line("option", format!("{name} = {value}"));
     }
@@ -79,11 +86,23 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     );
     line("attributes", metadata.attributes.join(", "));
     line("closed", if metadata.closed { "yes: backs are hidden" } else { "no: drawn from both sides" }.into());
+    let unit = json.units.map(shown).unwrap_or_default();
     let [min, max] = [metadata.bounds.min, metadata.bounds.max].map(|[x, y, z]| format!("{x} {y} {z}"));
-    line("bounds", format!("{min} to {max}"));
-    let _ = writeln!(text, "\n{:>5} {:>12} {:>12} {:>14}", "level", "nodes", "bytes", "max error");
+    line("bounds", format!("{min} to {max} {unit}").trim_end().to_owned());
+    if let Some(ReferenceSystem { name, epsg, wkt }) = &metadata.reference_system {
+        let number = epsg.map(|epsg| format!("EPSG:{epsg}"));
+        let text = wkt.as_ref().map(|wkt| format!("{} bytes of WKT, shown with --json", wkt.len()));
+        line("system", [name.clone(), number, text].into_iter().flatten().collect::<Vec<_>>().join("; "));
+    }
+    let error = if unit.is_empty() { "max error".to_owned() } else { format!("max error/{unit}") };
+    let _ = writeln!(text, "\n{:>5} {:>12} {:>12} {error:>14}", "level", "nodes", "bytes");
     for level in &metadata.per_level {
         let _ = writeln!(text, "{:>5} {:>12} {:>12} {:>14.6e}", level.level, level.nodes, level.bytes, level.max_error);
     }
     Ok(Outcome::new(&json, text))
+}
+
+/// A stranger's words: they shall not steer the terminal.
+pub(crate) fn shown(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
 }

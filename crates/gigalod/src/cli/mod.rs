@@ -11,6 +11,7 @@ mod error;
 mod exact;
 mod files;
 mod info;
+mod inputs;
 mod parse;
 mod path_file;
 mod progress;

@@ -1,7 +1,7 @@
 //! Values of options.
 
 use gigalod_build::Options;
-use gigalod_geom::ImageSize;
+use gigalod_geom::{ImageSize, LengthUnit};
 use glam::DVec3;
 
 /// Bytes: `4096`, `512MiB`, `2GB`; binary and decimal units, whole or decimal numbers.
@@ -129,6 +129,14 @@ pub(crate) fn color(text: &str) -> Result<[u8; 3], String> {
     Ok([(value >> 16) as u8, (value >> 8) as u8, value as u8])
 }
 
+/// A unit of length, by its symbol.
+pub(crate) fn unit(text: &str) -> Result<LengthUnit, String> {
+    LengthUnit::ALL
+        .into_iter()
+        .find(|unit| unit.symbol() == text)
+        .ok_or_else(|| format!("'{text}', expected {}", LengthUnit::ALL.map(LengthUnit::symbol).join(", ")))
+}
+
 /// Bytes for people.
 pub(crate) fn readable_bytes(bytes: u64) -> String {
     indicatif::BinaryBytes(bytes).to_string()
@@ -145,6 +153,8 @@ mod tests {
         assert!(size("3 apples").is_err() && size("").is_err() && memory("63MiB").is_err());
         assert_eq!((count("2M"), count("1_000"), count("0.5k")), (Ok(2_000_000), Ok(1000), Ok(500)));
         assert!(count("0").is_err() && count("-3").is_err());
+        assert_eq!((unit("us-ft"), unit("mm")), (Ok(LengthUnit::UsSurveyFoot), Ok(LengthUnit::Millimetre)));
+        assert!(unit("M").is_err() && unit("").is_err() && unit("feet").is_err());
     }
 
     #[test]

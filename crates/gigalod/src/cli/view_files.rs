@@ -92,7 +92,7 @@ impl Files {
             work.at("reading", Some(done as f32 / total.max(1) as f32));
             !work.is_cancelled()
         };
-        let (container, original) = match cache::find(path, &mut at)? {
+        let (container, original) = match cache::find(path, None, &mut at)? {
             Found::Itself => (path.to_owned(), None),
             Found::Built(cached) => (cached, Some(path.to_owned())),
             Found::NotBuilt(cached) => {

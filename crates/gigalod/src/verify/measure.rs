@@ -2,10 +2,12 @@
 //!
 //! * Each vertex' true sphere (largest bounding sphere of the triangles around it, computed here anew) must be enclosed by
 //!   every decoded sphere on some path from the root to a leaf.
+//!   Of a model whose large triangles were diced, samples all over the triangles stand for that and the next two.
 //! * Each triangle's normal must lie in every cone on such a path for each of its corners, or culling could hide its front.
 //! * Each sample of the surface must lie in some leaf's decoded sphere.
 //! * No point of a decoded sphere may be farther from the surface than the node's stored error, twice its radius.
 
+use super::sampled::{Sampled, count_unsampled};
 use super::structure::SplatTree;
 use gigalod_format::splats::Node;
 use gigalod_geom::quantise::{cone, normal};
@@ -51,17 +53,27 @@ pub fn steps(tree: &SplatTree, mesh: &Mesh) -> u64 {
     (tree.nodes.len() + mesh.positions().len() + 2 * mesh.triangles().len()) as u64
 }
 
-/// Measures. `origin` is that of the file's local space, in model space. `at` is told from time to time, by any thread, how many
+/// Measures. `origin` is that of the file's local space, in model space; `sampled` says how the model was diced, if it was. `at` is told from time to time, by any thread, how many
 /// of the [`steps`] are done.
-pub fn against(tree: &SplatTree, origin: DVec3, mesh: &Mesh, at: &(dyn Fn(u64) + Sync)) -> Measured {
+pub fn against(
+    tree: &SplatTree,
+    origin: DVec3,
+    mesh: &Mesh,
+    sampled: Option<&Sampled>,
+    at: &(dyn Fn(u64) + Sync),
+) -> Measured {
     let steps = Steps::new(at);
     let bvh = Bvh::build(mesh);
-    let enclosed = count_unenclosed_vertices(tree, origin, mesh, &steps);
-    let uncovered = count_uncovered_samples(tree, origin, mesh, &steps);
-    let hidden = count_hidden_fronts(tree, origin, mesh, &steps);
-
+    let violations = match sampled {
+        Some(sampled) => count_unsampled(tree, origin, mesh, sampled, &steps),
+        None => {
+            count_unenclosed_vertices(tree, origin, mesh, &steps)
+                + count_uncovered_samples(tree, origin, mesh, &steps)
+                + count_hidden_fronts(tree, origin, mesh, &steps)
+        }
+    };
     let distance = |point: DVec3| bvh.nearest_point(point).map_or(f64::INFINITY, |nearest| nearest.distance);
-    nodes_against(tree, origin, &distance, &steps, enclosed + uncovered + hidden)
+    nodes_against(tree, origin, &distance, &steps, violations)
 }
 
 /// Measures all nodes by how far a point of model space is from the original. `violations` is what was found before.

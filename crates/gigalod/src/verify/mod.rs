@@ -1,15 +1,19 @@
 //! The judge of finished files: shares nothing with the builders but `geom` and `format`, and walks a file its own slow way.
 //!
 //! [`structure::check`] reads every byte and every tree bit; [`measure::against`] holds the decoded spheres against the
-//! original mesh, [`cloud::against_points`] against the original point cloud.
+//! original mesh, diced or not, [`cloud::against_points`] against the original point cloud.
 
 pub mod cloud;
 pub mod measure;
 mod nearest;
+mod sampled;
+mod skin;
 pub mod structure;
 
 pub use cloud::{against_points, steps_of_points};
 pub use measure::{Measured, against, mesh_of, steps};
+pub use sampled::Sampled;
+pub use skin::skin_of;
 pub use structure::{SplatTree, check};
 
 /// Problems beyond this many are counted, not told.

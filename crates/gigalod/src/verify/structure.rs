@@ -20,6 +20,8 @@ pub struct TreeNode {
     pub children: u8,
     /// As stored.
     pub node: Node,
+    /// As stored, 5-6-5, if the file has colours.
+    pub color: Option<u16>,
 }
 
 /// A whole tree: the root is node 0.
@@ -106,10 +108,12 @@ impl Walk<'_> {
             for parent in parents.iter().take(expected) {
                 let size = usize::from(*groups.next().expect("sizes add up, as decoding has checked"));
                 let nodes = &contents.nodes[at..at + size];
+                let colors = contents.colors.get(at..at + size).unwrap_or_default();
                 (at, word) = (at + size, word + size);
                 let pointer = decoded.words().get(word).copied();
                 let has_pointer = nodes.iter().any(|node| !node.is_leaf());
-                if !self.group(nodes, *parent, pointer.filter(|_| has_pointer).map(|word| decoded.family(word)), page) {
+                let below = pointer.filter(|_| has_pointer).map(|word| decoded.family(word));
+                if !self.group((nodes, colors), *parent, below, page) {
                     return false;
                 }
                 word += usize::from(has_pointer);
@@ -119,7 +123,13 @@ impl Walk<'_> {
     }
 
     /// A group and the family below it, if any; false where it is not what its parent announced.
-    fn group(&mut self, nodes: &[Node], parent: Option<u32>, below: Option<FamilyPlace>, page: PageId) -> bool {
+    fn group(
+        &mut self,
+        (nodes, colors): (&[Node], &[u16]),
+        parent: Option<u32>,
+        below: Option<FamilyPlace>,
+        page: PageId,
+    ) -> bool {
         let first = self.tree.nodes.len() as u32;
         let size = nodes.len() as u8;
         let announced = match parent {
@@ -139,7 +149,7 @@ impl Walk<'_> {
             self.tree.nodes[parent as usize]
         });
         let (mut parents, mut groups) = (Parents::default(), 0);
-        for node in nodes {
+        for (at, node) in nodes.iter().enumerate() {
             if usize::from(node.sphere()) >= sphere::CODES || usize::from(node.normal()) >= normal::CODES {
                 self.problems
                     .add(|| format!("page {page}: sphere code {}, normal code {}", node.sphere(), node.normal()));
@@ -153,7 +163,13 @@ impl Walk<'_> {
                 parents[groups] = Some(self.tree.nodes.len() as u32);
                 groups += 1;
             }
-            self.tree.nodes.push(TreeNode { sphere, first_child: 0, children, node: *node });
+            self.tree.nodes.push(TreeNode {
+                sphere,
+                first_child: 0,
+                children,
+                node: *node,
+                color: colors.get(at).copied(),
+            });
         }
         if let Some(below) = below
             && self.announced.insert(below, parents).is_some()

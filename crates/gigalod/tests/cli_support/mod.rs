@@ -222,7 +222,7 @@ pub(crate) fn strips(side: usize) -> String {
         side - 1
     );
     for (row, column) in (0..side).flat_map(|row| (0..side).map(move |column| (row, column))) {
-        writeln!(text, "{column} {row} {}", (row * row + 3 * column) % 7).unwrap();
+        writeln!(text, "{column} {row} 0.{}", (row * row + 3 * column) % 7).unwrap();
     }
     for row in 0..side - 1 {
         write!(text, "{}", 2 * side).unwrap();

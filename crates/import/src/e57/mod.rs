@@ -8,6 +8,7 @@
 //!   nothing. The sky is up the z axis.
 //! * **Colours** are there if all scans with points have them: from the limits that the scan declares for them, or those of
 //!   the number type, to 0…255.
+//! * **Lengths** are metres, as the format asks for; what it says about the system of coordinates is passed on.
 //! * **Pages** are checked against their checksums as they are read.
 //! * The description, an XML text, has at most 16 MiB. It is read by the crate `e57`; points are unpacked here, column by
 //!   column, since the crate's reader of points cannot outlive a call. Pictures are ignored. Not read from gzip.
@@ -16,12 +17,14 @@ mod columns;
 mod pages;
 
 use crate::{
-    Attributes, Batch, ImportError, ModelStream, Place,
+    Attributes, Batch, ImportError, ModelStream, Place, ReferenceSystem,
     error::{Problem, said},
     input::Input,
+    reference,
 };
 use ::e57::{E57Reader, PointCloud, RecordDataType, RecordName, RecordValue};
 use columns::Column;
+use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use glam::{DQuat, DVec3};
 use pages::Pages;
@@ -54,6 +57,11 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError
     let place = Place::byte(0);
     let reader = E57Reader::new(&mut source)
         .map_err(|error| ImportError::malformed("an E57 file", said(error), place.clone()))?;
+    // What E57 asks for here is WKT; some programs write names.
+    let system = reader.coordinate_metadata().and_then(|text| match reference::of_wkt(text) {
+        (Some(system), _) => Some(system),
+        (None, _) => ReferenceSystem { name: reference::name(text), ..ReferenceSystem::default() }.known(),
+    });
     let clouds: VecDeque<PointCloud> = reader.pointclouds().into_iter().filter(|cloud| cloud.records > 0).collect();
     let points: u64 = clouds.iter().fold(0, |sum, cloud| sum.saturating_add(cloud.records));
     if points >= u64::from(u32::MAX) {
@@ -61,8 +69,17 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError
     }
     let has_color = |cloud: &PointCloud| COLOR.iter().all(|name| column_of(cloud, name).is_some());
     let colors = !clouds.is_empty() && clouds.iter().all(has_color);
-    let mut stream =
-        E57Stream { pages: Pages::new(source), clouds, scan: None, colors, read: 0, points, total_bytes, scans: 0 };
+    let mut stream = E57Stream {
+        pages: Pages::new(source),
+        clouds,
+        scan: None,
+        colors,
+        system,
+        read: 0,
+        points,
+        total_bytes,
+        scans: 0,
+    };
     // What is wrong with the first scan is said at once.
     stream.begin_scan()?;
     Ok(Box::new(stream))
@@ -88,6 +105,7 @@ struct E57Stream {
     clouds: VecDeque<PointCloud>,
     scan: Option<Scan>,
     colors: bool,
+    system: Option<ReferenceSystem>,
     /// Points read, and of all scans.
     read: u64,
     points: u64,
@@ -303,6 +321,14 @@ impl ModelStream for E57Stream {
 
     fn up_axis(&self) -> UpAxis {
         UpAxis::Z
+    }
+
+    fn unit(&self) -> Option<LengthUnit> {
+        Some(LengthUnit::Metre)
+    }
+
+    fn reference_system(&self) -> Option<&ReferenceSystem> {
+        self.system.as_ref()
     }
 
     fn declared_vertices(&self) -> Option<u64> {

@@ -44,7 +44,8 @@ impl Pages {
 
     /// Where the next byte is in the file itself.
     pub(super) fn place(&self) -> Place {
-        Place::byte(self.at / CONTENT_BYTES * PAGE_BYTES as u64 + self.at % CONTENT_BYTES)
+        let page = (self.at / CONTENT_BYTES).saturating_mul(PAGE_BYTES as u64);
+        Place::byte(page.saturating_add(self.at % CONTENT_BYTES))
     }
 
     /// The next bytes; `what` says what they are a part of.

@@ -181,6 +181,18 @@ impl Buffers {
         Ok(whole)
     }
 
+    /// The file of a picture that lies in the model.
+    pub(super) fn picture(&mut self, root: &json::Root, number: usize) -> Result<Vec<u8>, ImportError> {
+        let image = root.images.get(number).ok_or_else(|| missing("image", number, root.images.len()))?;
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => {
+                data_uri(uri).map_err(|found| ImportError::malformed("data in base64", found, item("image", number)))
+            }
+            (None, Some(view)) => self.whole(root, view),
+            (None, None) => Err(ImportError::malformed("a picture", "neither data nor a view", item("image", number))),
+        }
+    }
+
     fn content_bytes(&self, number: usize) -> u64 {
         match self.contents.get(number) {
             Some(Content::File { bytes, .. }) => *bytes,

@@ -21,6 +21,7 @@ pub(super) struct Root {
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<Texture>,
     pub(super) images: Vec<Image>,
+    pub(super) samplers: Vec<Sampler>,
     pub(super) extensions_required: Vec<String>,
 }
 
@@ -229,6 +230,8 @@ pub(super) struct Fallback {
 pub(super) struct Material {
     pub(super) name: Option<String>,
     pub(super) pbr_metallic_roughness: Option<Roughness>,
+    pub(super) alpha_mode: Option<String>,
+    pub(super) alpha_cutoff: Option<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -244,16 +247,45 @@ pub(super) struct TextureUse {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: usize,
+    #[serde(default)]
+    pub(super) extensions: Option<Box<TextureUseExtensions>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct TextureUseExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub(super) transform: Option<TextureTransform>,
+}
+
+/// Of texture coordinates before they are used.
+#[derive(Clone, Copy, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct TextureTransform {
+    pub(super) offset: [f64; 2],
+    /// Radians.
+    pub(super) rotation: f64,
+    pub(super) scale: Option<[f64; 2]>,
+    pub(super) tex_coord: Option<usize>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Texture {
     pub(super) source: Option<usize>,
+    pub(super) sampler: Option<usize>,
 }
 
 #[derive(Default, Deserialize)]
-#[serde(default)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct Sampler {
+    pub(super) wrap_s: Option<u32>,
+    pub(super) wrap_t: Option<u32>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
 pub(super) struct Image {
     pub(super) uri: Option<String>,
+    pub(super) buffer_view: Option<usize>,
 }

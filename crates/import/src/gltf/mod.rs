@@ -12,7 +12,9 @@
 //! * **Packed data**: `EXT_meshopt_compression` (a view must fit 256 MiB), `KHR_draco_mesh_compression` (a primitive must fit
 //!   512 MiB), `KHR_mesh_quantization`. Other extensions that a file *requires* are refused, but those of materials and lights.
 //! * **Colours**, if any primitive has them: `COLOR_0` times the base colour, in linear light, as sRGB.
-//! * **Texture coordinates** and materials are streamed where a base colour has a texture; pictures are named, not read.
+//! * **Texture coordinates** and materials are streamed where a base colour has a texture; pictures are read when
+//!   they are asked for. `KHR_texture_transform` is in the coordinates already. What an alpha mask leaves out is told; what is
+//!   blended is taken for opaque.
 //! * **Buffers** in other files come through [`SideFiles`]; names may have escapes (`%20`). GLB is not read from gzip.
 
 mod accessors;
@@ -51,6 +53,6 @@ pub(crate) fn open(input: Input, mut side: Box<dyn SideFiles>) -> Result<Box<dyn
     drop(container.json);
     scene::check_version(&root)?;
     let buffers = Buffers::open(&root, container.chunk, &mut *side)?;
-    let stream = stream::GltfStream::new(Data::new(root, buffers), container.total_bytes)?;
+    let stream = stream::GltfStream::new(Data::new(root, buffers), side, container.total_bytes)?;
     Ok(Box::new(stream))
 }

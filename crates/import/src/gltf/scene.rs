@@ -5,8 +5,8 @@ use super::{
     buffers::{item, missing, percent_decoded},
     json,
 };
-use crate::{CornerBatch, ImportError, Material, Place, Texture};
-use glam::{DAffine3, DMat4, DQuat, DVec3};
+use crate::{CornerBatch, ImportError, Mapping, Material, Place, Texture, Wrap};
+use glam::{DAffine3, DMat2, DMat4, DQuat, DVec2, DVec3};
 use std::collections::HashMap;
 
 /// A mesh at a node.
@@ -36,6 +36,8 @@ pub(super) struct Part {
     pub(super) indices: u64,
     /// The accessor, or number in a packed mesh, of the texture coordinates that are used.
     pub(super) tex_coord: Option<usize>,
+    /// What the material does to them.
+    pub(super) transform: json::TextureTransform,
     /// Number, or [`CornerBatch::NONE`].
     pub(super) material: u32,
     /// Linear.
@@ -225,6 +227,7 @@ pub(super) fn parts(data: &Data, mesh: usize) -> Result<Vec<Part>, ImportError> 
             vertices,
             indices,
             tex_coord,
+            transform: material.as_ref().map(|(_, material)| material.transform).unwrap_or_default(),
             material: material.as_ref().map_or(CornerBatch::NONE, |&(number, _)| number as u32),
             color: material.map_or([1.0; 3], |(_, material)| material.color),
             is_packed: draco.is_some(),
@@ -239,32 +242,69 @@ struct Look {
     /// Linear.
     color: [f64; 3],
     tex_coord_set: Option<usize>,
+    transform: json::TextureTransform,
+}
+
+impl json::TextureTransform {
+    /// From texture coordinates of the file, v downwards, to those of a stream, v upwards.
+    pub(super) fn apply(&self, u: f64, v: f64) -> [f32; 2] {
+        let (sin, cos) = (libm::sin(self.rotation), libm::cos(self.rotation));
+        let rotation = DMat2::from_cols(DVec2::new(cos, -sin), DVec2::new(sin, cos));
+        let scale = DVec2::from_array(self.scale.unwrap_or([1.0; 2]));
+        let [u, v] = (DVec2::from_array(self.offset) + rotation * (scale * DVec2::new(u, v))).to_array();
+        let coord = [u as f32, 1.0 - v as f32];
+        if coord[0].is_finite() && coord[1].is_finite() { coord } else { [0.0; 2] }
+    }
 }
 
 fn material(root: &json::Root, number: usize) -> Result<Look, ImportError> {
     let material = root.materials.get(number).ok_or_else(|| missing("material", number, root.materials.len()))?;
     let roughness = material.pbr_metallic_roughness.as_ref();
     let [red, green, blue, _] = roughness.and_then(|it| it.base_color_factor).unwrap_or([1.0; 4]);
-    let tex_coord_set = roughness.and_then(|it| it.base_color_texture.as_ref()).map(|texture| texture.tex_coord);
-    Ok(Look { color: [red, green, blue], tex_coord_set })
+    let texture = roughness.and_then(|it| it.base_color_texture.as_ref());
+    let transform = texture.and_then(|texture| texture.extensions.as_ref()?.transform).unwrap_or_default();
+    let tex_coord_set = texture.map(|texture| transform.tex_coord.unwrap_or(texture.tex_coord));
+    Ok(Look { color: [red, green, blue], tex_coord_set, transform })
 }
 
 /// All materials, for triangles to name.
 pub(super) fn materials(root: &json::Root) -> Vec<Material> {
     let look = |material: &json::Material| {
         let roughness = material.pbr_metallic_roughness.as_ref();
-        let [red, green, blue, _] = roughness.and_then(|it| it.base_color_factor).unwrap_or([1.0; 4]);
-        let texture = roughness
-            .and_then(|it| it.base_color_texture.as_ref())
-            .and_then(|texture| root.textures.get(texture.index)?.source)
+        let [red, green, blue, alpha] = roughness.and_then(|it| it.base_color_factor).unwrap_or([1.0; 4]);
+        let used = roughness.and_then(|it| it.base_color_texture.as_ref());
+        let used = used.and_then(|texture| root.textures.get(texture.index));
+        let sampler = used.and_then(|texture| root.samplers.get(texture.sampler?));
+        let texture = used
+            .and_then(|texture| texture.source)
             .and_then(|image| Some((image, root.images.get(image)?)))
             .map(|(number, image)| match &image.uri {
                 Some(uri) if !uri.starts_with("data:") => Texture::File(percent_decoded(uri)),
                 _ => Texture::Embedded(number as u32),
             });
-        Material { name: material.name.clone().unwrap_or_default(), color: [red, green, blue].map(srgb8), texture }
+        let cutoff = (material.alpha_mode.as_deref() == Some("MASK")).then(|| material.alpha_cutoff.unwrap_or(0.5));
+        Material {
+            name: material.name.clone().unwrap_or_default(),
+            color: [red, green, blue].map(srgb8),
+            is_in_vertices: true,
+            texture,
+            mapping: Mapping {
+                wrap: [sampler.and_then(|it| it.wrap_s), sampler.and_then(|it| it.wrap_t)].map(wrap),
+                ..Mapping::default()
+            },
+            alpha_cutoff: cutoff.map(|cutoff| (cutoff * 255.0 / alpha.max(1e-3)) as u8),
+        }
     };
     root.materials.iter().map(look).collect()
+}
+
+/// By the number that OpenGL has for it.
+fn wrap(number: Option<u32>) -> Wrap {
+    match number {
+        Some(33_071) => Wrap::Clamp,
+        Some(33_648) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    }
 }
 
 /// 8-bit sRGB of a linear intensity.
@@ -275,13 +315,14 @@ pub(super) fn srgb8(linear: f64) -> u8 {
 
 /// Refuses files that ask for more than this reader does.
 pub(super) fn check_version(root: &json::Root) -> Result<(), ImportError> {
-    const KNOWN: [&str; 8] = [
+    const KNOWN: [&str; 9] = [
         "EXT_meshopt_compression",
         "EXT_mesh_gpu_instancing",
         "KHR_draco_mesh_compression",
         "KHR_mesh_quantization",
         "KHR_lights_punctual",
         "KHR_texture_basisu",
+        "KHR_texture_transform",
         "EXT_texture_webp",
         "KHR_xmp_json_ld",
     ];

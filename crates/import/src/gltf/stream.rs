@@ -10,9 +10,13 @@ use super::{
     json,
     scene::{self, Draw, Part, Topology},
 };
-use crate::{Attributes, Batch, CornerBatch, ImportError, Material, ModelStream, error::Problem};
+use crate::{
+    Attributes, Batch, ByteSource, CornerBatch, ImportError, Material, ModelStream, SideFiles, Texture, error::Problem,
+};
+use gigalod_geom::LengthUnit;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::collections::{HashMap, hash_map::Entry};
+use std::io::Cursor;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -21,6 +25,7 @@ const STEP: u64 = 1 << 14;
 
 pub(super) struct GltfStream {
     data: Data,
+    side: Box<dyn SideFiles>,
     draws: Vec<Draw>,
     /// Parts of each mesh that is drawn.
     parts: HashMap<u32, Arc<Vec<Part>>>,
@@ -74,7 +79,7 @@ struct Rows {
 }
 
 impl GltfStream {
-    pub(super) fn new(data: Data, total_bytes: u64) -> Result<Self, ImportError> {
+    pub(super) fn new(data: Data, side: Box<dyn SideFiles>, total_bytes: u64) -> Result<Self, ImportError> {
         let draws = scene::draws(&data)?;
         let mut parts: HashMap<u32, Arc<Vec<Part>>> = HashMap::new();
         for draw in &draws {
@@ -101,6 +106,7 @@ impl GltfStream {
         let materials = scene::materials(&data.root);
         Ok(Self {
             data,
+            side,
             draws,
             parts,
             materials,
@@ -292,11 +298,7 @@ impl GltfStream {
             vertices.colors.extend(rows.colors.iter().map(color));
             vertices.colors.resize(vertices.positions.len(), color(&[1.0; 4]));
         }
-        // Pictures have their first row at the top.
-        let coords = rows.tex_coords.iter().map(|&[u, v, ..]| [u as f32, 1.0 - v as f32]);
-        batch
-            .tex_coords
-            .extend(coords.map(|coord| if coord[0].is_finite() && coord[1].is_finite() { coord } else { [0.0; 2] }));
+        batch.tex_coords.extend(rows.tex_coords.iter().map(|&[u, v, ..]| part.transform.apply(u, v)));
         self.tex_coords += rows.tex_coords.len() as u64;
         self.vertices += count;
         self.done += count;
@@ -387,8 +389,24 @@ impl ModelStream for GltfStream {
         self.attributes
     }
 
+    fn unit(&self) -> Option<LengthUnit> {
+        Some(LengthUnit::Metre)
+    }
+
     fn materials(&self) -> &[Material] {
         &self.materials
+    }
+
+    fn open_picture(&mut self, _material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        match texture {
+            Texture::File(name) => {
+                self.side.open(name).map_err(|source| ImportError::new(Problem::Io { source }, None))
+            }
+            Texture::Embedded(number) => {
+                let bytes = self.data.buffers.picture(&self.data.root, *number as usize)?;
+                Ok(Box::new(Cursor::new(bytes)))
+            }
+        }
     }
 
     fn declared_vertices(&self) -> Option<u64> {

@@ -1,19 +1,15 @@
-//! The header of LAS, and the record that says how LAZ is packed.
+//! The header of LAS.
 //!
 //! What always holds: records are as long as their point format needs at least; the points lie behind the header; a LAZ
 //! file's items make up its records.
 
+use super::records::{self, Extent, Records};
 use crate::{ImportError, Place, input::Input};
-use laz::LazVlr;
 
 /// Least length of a header, that of LAS 1.0.
 const LEAST_HEADER_BYTES: usize = 227;
 /// Length of the header of LAS 1.4.
 const HEADER_BYTES_1_4: usize = 375;
-/// Most variable-length records that are looked through.
-const MOST_RECORDS: u32 = 1 << 16;
-/// A record of LAZ has a few items of 6 bytes.
-const MOST_LAZ_BYTES: usize = 1 << 12;
 
 /// Bytes of a record without extra bytes, and where its colour is, by point format.
 const POINT_FORMATS: [(usize, Option<usize>); 11] = [
@@ -40,8 +36,8 @@ pub(super) struct Header {
     /// Of x, y and z.
     pub(super) scale: [f64; 3],
     pub(super) offset: [f64; 3],
-    /// How the points are packed, if they are.
-    pub(super) laz: Option<LazVlr>,
+    /// How the points are packed, and what their coordinates mean.
+    pub(super) records: Records,
 }
 
 impl Header {
@@ -98,41 +94,11 @@ pub(super) fn read(input: &mut Input) -> Result<Header, ImportError> {
     }
     let triple = |at: usize| std::array::from_fn(|axis| f64::from_le_bytes(bytes_at(bytes, at + 8 * axis)));
     let (scale, offset): ([f64; 3], [f64; 3]) = (triple(131), triple(155));
+    let late = is_1_4.then(|| (u64::from_le_bytes(bytes_at(bytes, 235)), u32_at(bytes, 243)));
+    let extent = Extent { count: vlr_count, points_offset, late };
     input.consume(header_bytes);
-    let laz = if is_packed { Some(read_laz(input, vlr_count, points_offset, record_bytes)?) } else { None };
-    Ok(Header { point_count, points_offset, record_bytes, color_offset, scale, offset, laz })
-}
-
-/// Finds the record of LAZ among the variable-length records.
-fn read_laz(input: &mut Input, vlr_count: u32, points_offset: u64, record_bytes: usize) -> Result<LazVlr, ImportError> {
-    /// Bytes before the contents of a variable-length record.
-    const RECORD_HEADER_BYTES: usize = 54;
-    let missing = |place| ImportError::malformed("a record `laszip encoded` before the packed points", "none", place);
-    for _ in 0..vlr_count.min(MOST_RECORDS) {
-        let place = Place::byte(input.offset());
-        if input.offset() + RECORD_HEADER_BYTES as u64 > points_offset || !input.has(RECORD_HEADER_BYTES)? {
-            return Err(missing(place));
-        }
-        let head = input.window();
-        let bytes = usize::from(u16_at(head, 20));
-        let is_laz = head[2..].starts_with(LazVlr::USER_ID.as_bytes()) && u16_at(head, 18) == LazVlr::RECORD_ID;
-        input.consume(RECORD_HEADER_BYTES);
-        if !is_laz {
-            input.skip(bytes as u64)?;
-            continue;
-        }
-        if bytes > MOST_LAZ_BYTES || !input.has(bytes)? {
-            return Err(missing(place));
-        }
-        let vlr = LazVlr::from_buffer(&input.window()[..bytes])
-            .map_err(|error| ImportError::malformed("a record that describes LAZ", error.to_string(), place.clone()))?;
-        super::laz::check(&vlr, record_bytes).map_err(|found| {
-            let expected = format!("items of LAZ that make up points of {record_bytes} bytes");
-            ImportError::malformed(expected, found, place)
-        })?;
-        return Ok(vlr);
-    }
-    Err(missing(Place::byte(input.offset())))
+    let records = records::read(input, &extent, is_packed.then_some(record_bytes))?;
+    Ok(Header { point_count, points_offset, record_bytes, color_offset, scale, offset, records })
 }
 
 fn bytes_at<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {

@@ -6,12 +6,14 @@
 //! chunks of varying size; everything else is found on the way. Sizes are checked against the file before anything is
 //! allocated: memory is that of a chunk.
 
+use super::gps::GpsTimes;
 use super::header::Header;
+use super::source::Source;
 use crate::{ByteSource, ImportError, Place, error::Problem};
 use laz::laszip::ChunkTable;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
 use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
-use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 /// Largest chunk of layers, packed. Usual ones have a few hundred kilobytes.
 const MOST_CHUNK_BYTES: u64 = 256 << 20;
@@ -19,8 +21,6 @@ const MOST_CHUNK_BYTES: u64 = 256 << 20;
 const MOST_EXTRA_BYTES: u16 = 1024;
 /// Most chunks in a table that must be read.
 const MOST_CHUNKS: u32 = 1 << 22;
-
-type Source = BufReader<Box<dyn ByteSource>>;
 
 pub(super) struct LazRecords {
     unpacker: Unpacker,
@@ -80,7 +80,7 @@ impl LazRecords {
         let place = Place::byte(header.points_offset);
         let failed = |source: io::Error| ImportError::new(Problem::Io { source }, Some(place.clone()));
         let end = source.seek(SeekFrom::End(0)).map_err(failed)?;
-        let mut source = BufReader::with_capacity(64 << 10, source);
+        let mut source = Source::new(source).map_err(failed)?;
         source.seek(SeekFrom::Start(header.points_offset)).map_err(failed)?;
         let cannot =
             |error: laz::LasZipError| ImportError::malformed("LAZ of a known kind", error.to_string(), place.clone());
@@ -159,8 +159,17 @@ impl LazRecords {
         };
         let count = match unpacker {
             Unpacker::PointWise { records, table } => {
+                let code = records.get_mut().ahead(self.record_bytes);
+                if let Err(error) = code.and_then(|code| code.map_or(Ok(()), check_code)) {
+                    return Err(self.failed(error, number));
+                }
                 records.reset();
-                records.set_fields_from(&items).map_err(cannot)?;
+                for item in items {
+                    match (item.item_type(), item.version()) {
+                        (LazItemType::GpsTime, 2) => records.add_field_decompressor(GpsTimes::default()),
+                        _ => records.set_fields_from(&vec![item]).map_err(cannot)?,
+                    }
+                }
                 match (is_point_wise_in_one(vlr)?, table) {
                     (true, _) => u64::MAX,
                     (_, Some(table)) => table.as_ref().get(self.chunk).map_or(0, |entry| entry.point_count),
@@ -211,7 +220,7 @@ fn read_layers(source: &mut Source, record_bytes: usize, layers: usize, left: u6
     let (words, _) = bytes[record_bytes..].as_chunks::<4>();
     let mut words = words.iter().map(|word| u64::from(u32::from_le_bytes(*word)));
     let count = words.next().unwrap_or_default();
-    let layer_bytes: u64 = words.sum();
+    let layer_bytes: u64 = words.clone().sum();
     if layer_bytes > left.saturating_sub(head_bytes as u64) {
         return Err(io::ErrorKind::UnexpectedEof.into());
     }
@@ -219,9 +228,25 @@ fn read_layers(source: &mut Source, record_bytes: usize, layers: usize, left: u6
         let message = format!("a chunk of {layer_bytes} bytes, more than {MOST_CHUNK_BYTES}");
         return Err(io::Error::new(io::ErrorKind::InvalidData, message));
     }
+    let sizes: Vec<usize> = words.map(|size| size as usize).collect();
     bytes.resize(head_bytes + layer_bytes as usize, 0);
     source.read_exact(&mut bytes[head_bytes..])?;
+    let mut rest = &bytes[head_bytes..];
+    for size in sizes {
+        let (layer, after) = rest.split_at(size);
+        layer.first_chunk().map_or(Ok(()), |code| check_code(*code))?;
+        rest = after;
+    }
     Ok((bytes, count))
+}
+
+/// Looks at the first bytes of an arithmetic code: it is a number below one. The unpacker relies on that, and never finds back
+/// from a code that is not.
+fn check_code(first: [u8; 4]) -> io::Result<()> {
+    match first {
+        [255, 255, 255, 255] => Err(io::Error::new(io::ErrorKind::InvalidData, "a code that nothing is packed to")),
+        _ => Ok(()),
+    }
 }
 
 /// Looks at the number of chunks that a table declares, before it is read.

@@ -9,20 +9,28 @@
 //!   where none of those points has a channel above 255, they are taken for 8 bits, as many programs write them.
 //! * **Counts**: the header's is believed one point at a time. Before LAS 1.4 it has 32 bits. A stream has fewer than 2³²
 //!   points, since that is how vertices are numbered.
-//! * **Everything else** (intensity, classes, times, waveforms, projections) is skipped.
+//! * **What coordinates mean**: the name, number and text of the system of coordinates and the horizontal unit of lengths, from
+//!   the records of WKT or GeoTIFF, which must not lie to be useful and do no harm where they do.
+//! * **Everything else** (intensity, classes, times, waveforms) is skipped.
 //! * LAZ is not read from gzip.
 
+mod gps;
 mod header;
 mod laz;
+mod records;
+mod source;
 
 use self::laz::LazRecords;
-use crate::{Attributes, Batch, ImportError, ModelStream, Place, error::Problem, input::Input};
+use crate::{Attributes, Batch, ImportError, ModelStream, Place, ReferenceSystem, error::Problem, input::Input};
+use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use glam::DVec3;
 use header::Header;
 
 /// Most bytes of records in memory: fewer points make a batch where each has thousands of extra bytes.
 const MOST_PIECE_BYTES: usize = 8 << 20;
+/// Points that are read at a time after the first batch, few enough to stay in the cache until they are converted.
+const RUN: usize = 4096;
 /// Most points for each byte of a LAZ file. Real ones have one or less; packed nothings could go on for ever.
 const MOST_POINTS_PER_BYTE: u64 = 64;
 
@@ -36,11 +44,11 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError
     let header = header::read(&mut input)?;
     let total_bytes = input.progress().1;
     let most = (total_bytes * MOST_POINTS_PER_BYTE).max(Batch::TARGET as u64);
-    if header.laz.is_some() && header.point_count > most {
+    if header.records.laz.is_some() && header.point_count > most {
         let expected = format!("at most {most} points in a LAZ file of {total_bytes} bytes");
         return Err(ImportError::malformed(expected, header.point_count.to_string(), Place::byte(247)));
     }
-    let records = match &header.laz {
+    let records = match &header.records.laz {
         None => {
             let before = header.points_offset - input.offset();
             if !input.skip(before)? {
@@ -55,7 +63,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn ModelStream>, ImportError
     };
     let mut stream =
         LasStream { header, records, read: 0, piece: Vec::new(), colors: None, total_bytes, is_first: true };
-    stream.fill()?;
+    stream.fill(Batch::TARGET)?;
     stream.decide_colors();
     Ok(Box::new(stream))
 }
@@ -86,10 +94,10 @@ struct Colors {
 }
 
 impl LasStream {
-    /// Reads the records of the next batch.
-    fn fill(&mut self) -> Result<(), ImportError> {
+    /// Reads the next records, so many at most.
+    fn fill(&mut self, most: usize) -> Result<(), ImportError> {
         let Self { header, records, piece, .. } = self;
-        let most = Batch::TARGET.min(MOST_PIECE_BYTES / header.record_bytes) as u64;
+        let most = most.min(MOST_PIECE_BYTES / header.record_bytes) as u64;
         let count = (header.point_count - self.read).min(most) as usize;
         let bytes = count * header.record_bytes;
         match records {
@@ -129,41 +137,20 @@ impl LasStream {
     }
 }
 
-fn color16(bytes: &[u8]) -> [u16; 3] {
-    std::array::from_fn(|channel| u16::from_le_bytes([bytes[2 * channel], bytes[2 * channel + 1]]))
-}
-
-impl ModelStream for LasStream {
-    fn attributes(&self) -> Attributes {
-        Attributes { normals: false, colors: self.colors.is_some() }
-    }
-
-    fn up_axis(&self) -> UpAxis {
-        UpAxis::Z
-    }
-
-    fn declared_vertices(&self) -> Option<u64> {
-        Some(self.header.point_count)
-    }
-
-    fn declared_faces(&self) -> Option<u64> {
-        Some(0)
-    }
-
-    fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
-        batch.clear();
-        if !std::mem::take(&mut self.is_first) {
-            self.fill()?;
-        }
+impl LasStream {
+    /// Appends the points of the piece.
+    fn convert(&self, batch: &mut Batch) -> Result<(), ImportError> {
         let Self { header, piece, .. } = self;
         let positions = &mut batch.vertices.positions;
-        for record in piece.chunks_exact(header.record_bytes) {
+        let before = positions.len();
+        positions.extend(piece.chunks_exact(header.record_bytes).map(|record| {
             let axis = |axis: usize| {
                 let bytes = *record[4 * axis..].first_chunk().expect("a record has three integers");
                 f64::from(i32::from_le_bytes(bytes)) * header.scale[axis] + header.offset[axis]
             };
-            positions.push(DVec3::new(axis(0), axis(1), axis(2)));
-        }
+            DVec3::new(axis(0), axis(1), axis(2))
+        }));
+        let positions = &positions[before..];
         if let Some(number) = positions.iter().position(|position| !position.is_finite()) {
             let position = positions[number].to_array();
             let first = self.read - positions.len() as u64;
@@ -177,7 +164,52 @@ impl ModelStream for LasStream {
                 color16(&record[offset..]).map(|channel| (channel >> shift).min(255) as u8)
             }));
         }
-        let more = !piece.is_empty();
+        Ok(())
+    }
+}
+
+fn color16(bytes: &[u8]) -> [u16; 3] {
+    std::array::from_fn(|channel| u16::from_le_bytes([bytes[2 * channel], bytes[2 * channel + 1]]))
+}
+
+impl ModelStream for LasStream {
+    fn attributes(&self) -> Attributes {
+        Attributes { normals: false, colors: self.colors.is_some() }
+    }
+
+    fn up_axis(&self) -> UpAxis {
+        UpAxis::Z
+    }
+
+    fn unit(&self) -> Option<LengthUnit> {
+        self.header.records.unit
+    }
+
+    fn reference_system(&self) -> Option<&ReferenceSystem> {
+        self.header.records.system.as_ref()
+    }
+
+    fn declared_vertices(&self) -> Option<u64> {
+        Some(self.header.point_count)
+    }
+
+    fn declared_faces(&self) -> Option<u64> {
+        Some(0)
+    }
+
+    fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
+        batch.clear();
+        while !batch.is_full() {
+            let is_first = std::mem::take(&mut self.is_first);
+            if !is_first {
+                self.fill(RUN.min(Batch::TARGET - batch.vertices.positions.len()))?;
+            }
+            self.convert(batch)?;
+            if is_first || self.piece.is_empty() {
+                break;
+            }
+        }
+        let more = !batch.is_empty();
         if !more && let Records::Plain(input) = &mut self.records {
             input.finish()?;
         }

@@ -1,7 +1,7 @@
 //! Materials: numbers for the names that `usemtl` gives, and what libraries say about them.
 
 use crate::{
-    Material, SideFiles, Texture,
+    Mapping, Material, SideFiles, Texture, Wrap,
     input::Input,
     text::{self, Lines, name, numbers},
 };
@@ -34,7 +34,7 @@ impl Materials {
             return Some(number);
         }
         let number = u32::try_from(self.used.len()).ok().filter(|_| self.used.len() < MOST)?;
-        let material = self.library.get(&name).cloned().unwrap_or_else(|| plain(name.clone()));
+        let material = self.library.get(&name).cloned().unwrap_or_else(|| Material::plain(name.clone()));
         self.used.push(material);
         self.numbers.insert(name, number);
         Some(number)
@@ -70,7 +70,7 @@ impl Materials {
             let Some((word, rest)) = text::word(line) else { continue };
             match (word, &mut material) {
                 (b"newmtl", _) => {
-                    let next = plain(name(&rest[..rest.len().min(MAX_NAME_BYTES)]));
+                    let next = Material::plain(name(&rest[..rest.len().min(MAX_NAME_BYTES)]));
                     self.insert(material.replace(next));
                 }
                 (b"Kd", Some(material)) => {
@@ -78,7 +78,7 @@ impl Materials {
                         material.color = color.map(|value| (value * 255.0 + 0.5) as u8);
                     }
                 }
-                (b"map_Kd", Some(material)) => material.texture = texture_name(rest).map(Texture::File),
+                (b"map_Kd", Some(material)) => (material.texture, material.mapping) = texture(rest),
                 _ => {}
             }
         }
@@ -95,12 +95,9 @@ impl Materials {
     }
 }
 
-fn plain(name: String) -> Material {
-    Material { name, color: [255; 3], texture: None }
-}
-
-/// The file's name after the options of a `map_Kd`, each of which has a known number of arguments.
-fn texture_name(mut rest: &[u8]) -> Option<String> {
+/// What a `map_Kd` says: options, each of which has a known number of arguments, and the file's name.
+fn texture(mut rest: &[u8]) -> (Option<Texture>, Mapping) {
+    let mut mapping = Mapping::default();
     while let Some((word, after)) = text::word(rest)
         && word.starts_with(b"-")
     {
@@ -116,11 +113,25 @@ fn texture_name(mut rest: &[u8]) -> Option<String> {
         for argument in 0..most {
             match text::word(rest) {
                 // Of three numbers, the last two may be missing.
-                Some((word, after)) if argument == 0 || crate::number::parse(word).is_some() => rest = after,
+                Some((value, after)) if argument == 0 || crate::number::parse(value).is_some() => {
+                    take_argument(&mut mapping, word, argument, value);
+                    rest = after;
+                }
                 _ => break,
             }
         }
     }
     let name = name(&rest[..rest.len().min(MAX_NAME_BYTES)]);
-    (!name.is_empty()).then_some(name)
+    ((!name.is_empty()).then_some(Texture::File(name)), mapping)
+}
+
+/// Takes the argument of an option of a `map_Kd`, if it says where the picture is.
+fn take_argument(mapping: &mut Mapping, option: &[u8], argument: usize, value: &[u8]) {
+    let number = crate::number::parse(value).map(|value| value as f32).filter(|value| value.is_finite());
+    match (option, number) {
+        (b"-o", Some(number)) if argument < 2 => mapping.offset[argument] = number,
+        (b"-s", Some(number)) if argument < 2 => mapping.scale[argument] = number,
+        (b"-clamp", _) if value == b"on" => mapping.wrap = [Wrap::Clamp; 2],
+        _ => {}
+    }
 }

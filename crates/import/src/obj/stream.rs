@@ -6,7 +6,7 @@ use super::{
     material::Materials,
 };
 use crate::{
-    Attributes, Batch, CornerBatch, ImportError, Material, ModelStream, Place, SideFiles,
+    Attributes, Batch, ByteSource, CornerBatch, ImportError, Material, ModelStream, Place, SideFiles, Texture,
     error::Problem,
     input::Input,
     polygon::Clipper,
@@ -222,6 +222,15 @@ impl ModelStream for ObjStream {
 
     fn materials(&self) -> &[Material] {
         &self.materials.used
+    }
+
+    fn open_picture(&mut self, material: u32, texture: &Texture) -> Result<Box<dyn ByteSource>, ImportError> {
+        match texture {
+            Texture::File(name) => {
+                self.side.open(name).map_err(|source| ImportError::new(Problem::Io { source }, None))
+            }
+            Texture::Embedded(_) => Err(ImportError::no_picture(material)),
+        }
     }
 
     fn declared_vertices(&self) -> Option<u64> {

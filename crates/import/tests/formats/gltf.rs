@@ -2,9 +2,9 @@
 
 use crate::make::{Gltf, draco, meshopt, square};
 use crate::sources::{error, read, read_with};
-use gigalod_import::{ByteSource, CornerBatch, Material, NoSideFiles, Texture, open_with, read_all};
+use gigalod_import::{ByteSource, CornerBatch, Material, NoSideFiles, Texture, Wrap, open_with, read_all};
 use serde_json::{Value, json};
-use std::io::{self, Cursor};
+use std::io::{self, Cursor, Read};
 
 const SQUARE: [[f64; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 
@@ -239,8 +239,66 @@ fn textured_materials_come_with_texture_coordinates() {
     assert_eq!(all.tex_coords, [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]; 2].concat());
     assert_eq!(all.corners.tex_coords, [[0, 1, 2], [0, 2, 3], [none; 3], [none; 3], [4, 5, 6], [4, 6, 7]]);
     assert_eq!(all.corners.materials, [0, 0, none, none, 1, 1]);
-    let material = |texture| Material { name: String::new(), color: [255; 3], texture: Some(texture) };
+    let material =
+        |texture| Material { is_in_vertices: true, texture: Some(texture), ..Material::plain(String::new()) };
     assert_eq!(stream.materials(), [material(Texture::File("a wall.jpg".to_owned())), material(Texture::Embedded(0))]);
+}
+
+#[test]
+fn textures_say_how_they_are_mapped_and_their_pictures_can_be_had() {
+    let mut gltf = square();
+    let coords = gltf.floats(&[[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.25, 0.5]]);
+    let transform =
+        json!({ "offset": [0.5, -1.0], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2.0, 4.0], "texCoord": 1 });
+    let used = json!({ "index": 0, "extensions": { "KHR_texture_transform": transform } });
+    let factor = json!([1.0, 1.0, 1.0, 0.5]);
+    gltf.push("materials", json!({
+        "pbrMetallicRoughness": { "baseColorTexture": used, "baseColorFactor": factor }, "alphaMode": "MASK", "alphaCutoff": 0.2
+    }));
+    gltf.push(
+        "materials",
+        json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 1 } }, "alphaMode": "BLEND" }),
+    );
+    gltf.push(
+        "materials",
+        json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 } }, "alphaMode": "MASK" }),
+    );
+    gltf.push("materials", json!({}));
+    gltf.json["textures"] = json!([{ "source": 0, "sampler": 0 }, { "source": 1, "sampler": 9 }, { "source": 2 }]);
+    gltf.json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648 }]);
+    let inside = base64(b"in the text");
+    gltf.json["images"] =
+        json!([{ "bufferView": 0 }, { "uri": "a%20wall.jpg" }, { "uri": format!("data:image/png;base64,{inside}") }]);
+    gltf.json["extensionsRequired"] = json!(["KHR_texture_transform"]);
+    let primitive = &mut gltf.json["meshes"][0]["primitives"][0];
+    primitive["attributes"]["TEXCOORD_1"] = coords.into();
+    primitive["material"] = 0.into();
+    let side = |name: &str| -> io::Result<Box<dyn ByteSource>> {
+        let file: &[u8] = if name == "a wall.jpg" { b"beside" } else { return Err(io::ErrorKind::NotFound.into()) };
+        Ok(Box::new(Cursor::new(file.to_vec())))
+    };
+    let mut stream = open_with(Box::new(Cursor::new(gltf.glb())), Box::new(side)).expect("it is a good file");
+    let all = read_all(&mut *stream, &mut |_, _| {}).expect("it is a good file");
+    // Scaled, turned (x to −y, y to x, downwards), moved; then upwards.
+    let expected = [[4.5, 2.0], [4.5, 4.0], [0.5, 4.0], [2.5, 2.5]];
+    for (coord, expected) in all.tex_coords.iter().zip(expected) {
+        assert!(coord.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{:?}", all.tex_coords);
+    }
+    let wraps: Vec<_> = stream.materials().iter().map(|material| material.mapping.wrap).collect();
+    assert_eq!(wraps[..2], [[Wrap::Clamp, Wrap::Mirror], [Wrap::Repeat; 2]]);
+    // 0.2 of a factor of 0.5; the default is a half.
+    let cutoffs: Vec<_> = stream.materials().iter().map(|material| material.alpha_cutoff).collect();
+    assert_eq!(cutoffs, [Some(102), None, Some(127), None]);
+    let mut picture = |material: u32| {
+        let texture = stream.materials()[material as usize].texture.clone().unwrap_or(Texture::Embedded(9));
+        let mut bytes = Vec::new();
+        let opened = stream.open_picture(material, &texture);
+        opened.map(|mut source| source.read_to_end(&mut bytes).map(|_| bytes).expect("it is there"))
+    };
+    assert_eq!(picture(0).expect("it is in the buffer")[..4], gltf.bytes[..4]);
+    assert_eq!(picture(1).expect("it is beside"), b"beside");
+    assert_eq!(picture(2).expect("it is in the text"), b"in the text");
+    assert!(picture(3).is_err());
 }
 
 #[test]

@@ -1,10 +1,14 @@
 //! The readers of all formats but PLY from outside: bytes in, batches or an error out.
 
+#[path = "../nasty/mod.rs"]
+mod nasty;
 #[path = "../ply/sources.rs"]
 mod sources;
 
+mod georeference;
 mod gltf;
 mod make;
+mod many;
 mod obj;
 mod off;
 mod points;

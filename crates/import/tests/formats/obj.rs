@@ -1,7 +1,7 @@
 //! OBJ and its materials.
 
 use crate::sources::{error, read, read_in_drops, read_with};
-use gigalod_import::{ByteSource, CornerBatch, Material, Texture, open_with, read_all};
+use gigalod_import::{ByteSource, CornerBatch, Mapping, Material, Texture, Wrap, open_with, read_all};
 use std::io::{self, Cursor};
 
 const NONE: u32 = CornerBatch::NONE;
@@ -128,12 +128,13 @@ fn materials_come_from_libraries() {
     let all = read_all(&mut *stream, &mut |_, _| {}).expect("it is a good file");
     assert_eq!(all.corners.materials, [0, 1, 2, 3, 4]);
     let material = |name: &str, color, texture: Option<&str>| Material {
-        name: name.to_owned(),
         color,
         texture: texture.map(|name| Texture::File(name.to_owned())),
+        ..Material::plain(name.to_owned())
     };
+    let mapping = Mapping { scale: [2.0, 1.0], offset: [0.5, 0.0], wrap: [Wrap::Clamp; 2] };
     let expected = [
-        material("picture", [255; 3], Some("brick wall.png")),
+        Material { mapping, ..material("picture", [255; 3], Some("brick wall.png")) },
         material("red", [255, 0, 128], None),
         material("unknown", [255; 3], None),
         material("a", [0, 255, 0], None),

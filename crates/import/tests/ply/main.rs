@@ -5,6 +5,8 @@ mod document;
 mod errors;
 mod gzip;
 mod header;
+#[path = "../nasty/mod.rs"]
+mod nasty;
 mod real_files;
 mod round_trip;
 mod sources;

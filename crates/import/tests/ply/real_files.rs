@@ -1,39 +1,8 @@
 //! Files as programs out there write them: run with `GIGALOD_DATA` set to the folder that has `scans` and `nasty`.
 
+use crate::nasty::PLY;
 use crate::sources::{Model, read_source};
 use std::{fs, path::PathBuf};
-
-type Outcome = Result<(usize, usize), &'static str>;
-
-/// What each file of `nasty` gives: vertices and triangles, or the error.
-const NASTY: &[(&str, Outcome)] = &[
-    (
-        "assimp_crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply",
-        Err(
-            "expected `property TYPE NAME` or `property list TYPE TYPE NAME`, with types among char uchar short ushort \
-            int uint float double, found `property \\x00\\x00\\x00\\t\\x07\\x00\\x00\\x00\\x03\\x00\\x00\\x00\\x03\\x03\
-            \\x00\\x00\\x00\\x07\\x00\\x00\\x00\\x04\\x00\\x00\\x00\\x03\\x03\\x00\\x00\\x00\\x04\\x00\\x00\\x00\\x00\\x00\\x00\\x00` \
-            (line 7)",
-        ),
-    ),
-    ("assimp_cube_binary_header_with_RN_newline.ply", Ok((8, 12))),
-    ("assimp_cube_binary_starts_with_nl.ply", Ok((8, 12))),
-    ("assimp_cube_uv.ply", Ok((24, 12))),
-    ("assimp_empty.ply", Err("expected a model, found an empty file")),
-    ("assimp_float-color.ply", Ok((3, 1))),
-    // Its vertices are declared with a list, which no line has.
-    (
-        "assimp_issue623.ply",
-        Err("expected the length of the list `vertex_indices`, found 7.941797 (line 15, vertex 0)"),
-    ),
-    ("assimp_points.ply", Ok((4, 0))),
-    ("happly_platonic_shelf_ascii.ply", Ok((50, 80))),
-    ("happly_platonic_shelf_big_endian.ply", Ok((50, 80))),
-    ("trimesh_ply_empty_header.ply", Err("expected an element `vertex`, found none (line 3)")),
-    ("trimesh_ply_points_bin.ply", Ok((8, 0))),
-    ("trimesh_points_ascii_with_lists.ply", Ok((5, 0))),
-    ("trimesh_points_emptyface.ply", Ok((1024, 0))),
-];
 
 /// The test data, or none with a note.
 fn data() -> Option<PathBuf> {
@@ -81,7 +50,6 @@ fn nasty_files_give_what_the_table_says() {
         })
         .collect();
     results.sort();
-    let expected: Vec<_> =
-        NASTY.iter().map(|&(name, result)| (name.to_owned(), result.map_err(str::to_owned))).collect();
+    let expected: Vec<_> = PLY.iter().map(|&(name, result)| (name.to_owned(), result.map_err(str::to_owned))).collect();
     assert_eq!(results, expected);
 }

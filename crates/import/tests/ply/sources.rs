@@ -1,6 +1,8 @@
 //! Reads a whole file through the public interface, holding every batch to its promises.
 
-use gigalod_import::{Attributes, Batch, ByteSource, CornerBatch, ImportError, NoSideFiles, SideFiles, open_with};
+use gigalod_import::{
+    Attributes, Batch, ByteSource, CornerBatch, ImportError, ModelStream, NoSideFiles, SideFiles, open_with,
+};
 use std::io::{Cursor, Read, Result, Seek, SeekFrom};
 
 /// Everything that a stream gives.
@@ -47,7 +49,10 @@ pub(crate) fn read_with(
     source: Box<dyn ByteSource>,
     side: Box<dyn SideFiles>,
 ) -> std::result::Result<Model, ImportError> {
-    let mut stream = open_with(source, side)?;
+    read_stream(open_with(source, side)?)
+}
+
+pub(crate) fn read_stream(mut stream: Box<dyn ModelStream>) -> std::result::Result<Model, ImportError> {
     let Attributes { normals, colors } = stream.attributes();
     let (mut model, mut batch) = (Model::default(), Batch::default());
     let mut progress = stream.bytes_consumed();

@@ -1,7 +1,7 @@
 // splat_resolve.wgsl: keys to G-buffer, for the splats of one buffer.
 //
 // Draw      one triangle that covers the picture; the scissor cuts out the band.
-// Reads     frame, parts; keys; balls, normals and colours.
+// Reads     frame, parts; found keys; balls, normals and colours.
 // Writes    albedo (linear; alpha 1), normal (world; w = largest distance between two pixels of the splat), depth (the bits of
 //           z, world units), depth test (near / z: 1 at the near plane, 0 at infinity).
 // Limits    none beyond the baseline of WebGPU.
@@ -12,8 +12,8 @@
 // The first part of the buffer; and all.
 @group(0) @binding(1) var<uniform> part: PartParams;
 @group(0) @binding(8) var<storage, read> parts: array<PartParams>;
-// Inverted number, nearness.
-@group(0) @binding(4) var<storage, read> keys: array<vec2u>;
+// Inverted number, nearness; in rows as long as those of the store.
+@group(0) @binding(9) var found: texture_2d<u32>;
 
 // True where there are several parts to tell apart: rare, and slow on some devices.
 override many_parts: bool = true;
@@ -27,7 +27,8 @@ override many_parts: bool = true;
 @fragment
 fn resolve(@builtin(position) position: vec4f) -> Surface {
     let pixel = vec2u(position.xy);
-    let key = keys[(pixel.y - frame.first_row) * u32(frame.size_px.x) + pixel.x];
+    let at = (pixel.y - frame.first_row) * u32(frame.size_px.x) + pixel.x;
+    let key = textureLoad(found, texel_of(at), 0).xy;
     let number = ~key.x;
     // Of this buffer's splats, in which numbers and places run alike? A smaller number wraps around.
     let slot = number - part.first_number;

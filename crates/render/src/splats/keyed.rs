@@ -18,8 +18,11 @@ use gigalod_geom::{Camera, ImageSize};
 use std::collections::BTreeMap;
 
 /// Splats whose window is at most this many pixels wide and high are drawn by the compute pass, unless
-/// [`crate::Renderer::set_compute_extent`] says otherwise. Measured.
-pub(crate) const COMPUTE_EXTENT_PX: u32 = 16;
+/// [`crate::Renderer::set_compute_extent`] says otherwise. Measured on the software adapter, for which a fragment costs more than
+/// an idle lane; where thousands of invocations run at once, a long one keeps its neighbours waiting.
+pub(crate) fn compute_extent_px(gpu: &Gpu) -> u32 {
+    if gpu.is_software() { MOST_COMPUTE_EXTENT_PX } else { 16 }
+}
 
 /// Beyond this an invocation of the compute pass would take too many turns: the software adapter ends all loops of an invocation
 /// after 65,535 turns in all, and draws 16 splats in one.
@@ -28,6 +31,9 @@ pub(crate) const MOST_COMPUTE_EXTENT_PX: u32 = 60;
 /// Bytes of a key, and of a pixel's sums.
 const KEY_BYTES: u64 = 8;
 const SUMS_BYTES: u64 = 40;
+
+/// Bytes of a row of the texture that keys are copied to: processors read textures faster than buffers.
+const KEYS_ROW_BYTES: u64 = store::WIDTH * KEY_BYTES;
 
 /// Bytes of a large splat in the list.
 pub(crate) const LISTED_BYTES: u64 = 4;
@@ -49,14 +55,15 @@ impl Bands {
     /// As few as bindings of `most_bytes` allow.
     pub(crate) fn new(size: ImageSize, kernel: Kernel, most_bytes: u64) -> Self {
         let row_bytes = u64::from(size.width) * if kernel.is_gauss() { SUMS_BYTES } else { KEY_BYTES };
-        let rows = (most_bytes / row_bytes).clamp(1, u64::from(size.height)) as u32;
+        let rows = (most_bytes.saturating_sub(KEYS_ROW_BYTES) / row_bytes).clamp(1, u64::from(size.height)) as u32;
         Self { rows, count: size.height.div_ceil(rows), height: size.height, width: size.width }
     }
 
     /// Bytes of keys and of sums.
     pub(crate) fn bytes(&self, kernel: Kernel) -> [u64; 2] {
         let pixels = u64::from(self.width) * u64::from(self.rows);
-        [pixels * KEY_BYTES, if kernel.is_gauss() { pixels * SUMS_BYTES } else { 0 }]
+        let keys = (pixels * KEY_BYTES).next_multiple_of(KEYS_ROW_BYTES);
+        [keys, if kernel.is_gauss() { pixels * SUMS_BYTES } else { 0 }]
     }
 
     fn rows_of(&self, band: u32) -> std::ops::Range<u32> {
@@ -68,6 +75,8 @@ impl Bands {
 #[derive(Debug)]
 pub(crate) struct KeyedBuffers {
     pub(crate) keys: Pool,
+    /// What they have become, to be read.
+    pub(crate) found: Pool,
     pub(crate) sums: Pool,
     pub(crate) list: Pool,
     pub(crate) draw: Pool,
@@ -77,7 +86,8 @@ impl KeyedBuffers {
     pub(crate) fn new() -> Self {
         use wgpu::BufferUsages as Usage;
         Self {
-            keys: Pool::new("keys", Usage::STORAGE),
+            keys: Pool::new("keys", Usage::STORAGE | Usage::COPY_SRC),
+            found: Pool::rows("found keys", wgpu::TextureFormat::Rg32Uint, store::WIDTH),
             sums: Pool::new("sums", Usage::STORAGE),
             list: Pool::new("large splats", Usage::STORAGE),
             draw: Pool::new("draw of large splats", Usage::STORAGE | Usage::INDIRECT),
@@ -87,9 +97,22 @@ impl KeyedBuffers {
     /// Asks for room.
     pub(crate) fn want(&mut self, bands: &Bands, kernel: Kernel, most_in_chunk: u64) {
         [self.keys.wanted, self.sums.wanted] = bands.bytes(kernel);
+        self.found.wanted = if kernel.is_gauss() { 0 } else { self.keys.wanted };
         // All of a chunk may be large.
         self.list.wanted = most_in_chunk.max(1) * LISTED_BYTES;
         self.draw.wanted = 16;
+    }
+
+    /// Copies the keys of a band, whole rows of the texture, to where they are read.
+    fn find(&self, encoder: &mut wgpu::CommandEncoder, keys_bytes: u64) {
+        let rows = (keys_bytes / KEYS_ROW_BYTES) as u32;
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(KEYS_ROW_BYTES as u32), rows_per_image: None };
+        encoder.copy_buffer_to_texture(
+            wgpu::TexelCopyBufferInfo { buffer: self.keys.buffer(), layout },
+            self.found.texture().as_image_copy(),
+            wgpu::Extent3d { width: store::WIDTH as u32, height: rows, depth_or_array_layers: 1 },
+        );
     }
 }
 
@@ -231,6 +254,9 @@ impl KeyedPass {
                 pass.set_bind_group(0, for_quads, &[pass_offset]);
                 pass.draw_indirect(draw, 0);
             }
+            if !frame.kernel.is_gauss() {
+                frame.buffers.find(encoder, keys);
+            }
             let mut pass = gbuffer.begin(encoder, band == 0);
             pass.set_pipeline(&pipelines.resolve);
             pass.set_scissor_rect(0, rows.start, frame.bands.width, rows.end - rows.start);
@@ -281,7 +307,7 @@ impl Pipelines {
             }
             entries
         };
-        let layout = |label, uniforms: usize, stages, textures: bool, storage: &[(u32, wgpu::ShaderStages, bool)]| {
+        let layout = |label, uniforms: usize, stages, textures: &[u32], storage: &[(u32, wgpu::ShaderStages, bool)]| {
             let buffer = |binding, visibility, ty, has_dynamic_offset, bytes| wgpu::BindGroupLayoutEntry {
                 binding,
                 visibility,
@@ -298,19 +324,18 @@ impl Pipelines {
             let storage = storage.iter().map(|(binding, stages, read_only)| {
                 buffer(*binding, *stages, wgpu::BufferBindingType::Storage { read_only: *read_only }, false, 0)
             });
-            let textures = [2, 3].into_iter().filter(|_| textures);
-            let textures = textures.map(|binding| store::layout_entry(binding, stages));
+            let textures = textures.iter().map(|binding| store::layout_entry(*binding, stages));
             let entries: Vec<_> = uniforms.chain(storage).chain(textures).collect();
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
         };
         let for_compute = [write(4, compute), write(6, compute), write(7, compute)];
         let for_quads = [write(4, fragment), read(6, vertex), read(8, vertex)];
-        let for_resolve: &[_] =
-            if gauss { &[read(4, fragment), read(5, fragment)] } else { &[read(4, fragment), read(8, fragment)] };
+        let for_resolve: (&[_], &[_]) =
+            if gauss { (&[], &[read(4, fragment), read(5, fragment)]) } else { (&[2, 3, 9], &[read(8, fragment)]) };
         let layouts = [
-            layout("small splats", 2, compute, true, &with_sums(for_compute.to_vec(), write(5, compute))),
-            layout("large splats", 1, both, true, &with_sums(for_quads.to_vec(), write(5, fragment))),
-            layout("resolved splats", if gauss { 1 } else { 2 }, fragment, !gauss, for_resolve),
+            layout("small splats", 2, compute, &[2, 3], &with_sums(for_compute.to_vec(), write(5, compute))),
+            layout("large splats", 1, both, &[2, 3], &with_sums(for_quads.to_vec(), write(5, fragment))),
+            layout("resolved splats", if gauss { 1 } else { 2 }, fragment, for_resolve.0, for_resolve.1),
         ];
         let [compute_layout, quads_layout, resolve_layout] = [0, 1, 2].map(|at: usize| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -394,9 +419,14 @@ impl Pipelines {
         };
         let (pass, part) = (passes.entry_of::<PassParams>(0), parts.entry_of::<PartParams>(1));
         let (keys, list, draw) = (buffers.keys.entry(4), buffers.list.entry(6), buffers.draw.entry(7));
-        let drawn = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3), keys.clone()];
+        let store = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3)];
+        let drawn = [&store[..], std::slice::from_ref(&keys)].concat();
         let all_parts = parts.entry(8);
-        let resolved = if gauss { vec![pass, keys] } else { [&drawn[..], &[part.clone(), all_parts.clone()]].concat() };
+        let resolved = if gauss {
+            vec![pass, keys]
+        } else {
+            [&store[..], &[part.clone(), all_parts.clone(), buffers.found.entry(9)]].concat()
+        };
         [
             group(0, [&drawn[..], &[part, list.clone(), draw]].concat()),
             group(1, [&drawn[..], &[all_parts, list]].concat()),

@@ -102,7 +102,7 @@ impl Chunk {
     }
 }
 
-/// Binding 2, balls, or 3, normals and colours, of splat_store.wgsl.
+/// Binding 2, balls, or 3, normals and colours, of splat_store.wgsl; or another of whole numbers.
 pub(crate) fn layout_entry(binding: u32, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
     let sample_type =
         if binding == 2 { wgpu::TextureSampleType::Float { filterable: false } } else { wgpu::TextureSampleType::Uint };

@@ -96,6 +96,7 @@ pub(in super::super) fn divide(
         bounds,
         closed: false,
         has_colors: cloud.colors.len() > 0,
+        dicing: None,
     };
     let scale = scale_of(extent);
     let has_normals = cloud.normals.len() > 0;
