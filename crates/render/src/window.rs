@@ -181,8 +181,15 @@ impl WindowPainter {
         self.ui.take(&self.gpu, textures);
     }
 
-    /// Paints a picture, stretched where it has another size than the window, under a user interface.
-    pub fn paint(&mut self, target: WindowImage, shown: Option<&Shown>, ui: &UiPaint<'_>) -> PaintedImage {
+    /// Paints a picture into the upper left `area` of the window, in physical pixels, stretched where it has another size; a user
+    /// interface over all of it.
+    pub fn paint(
+        &mut self,
+        target: WindowImage,
+        shown: Option<&Shown>,
+        area: ImageSize,
+        ui: &UiPaint<'_>,
+    ) -> PaintedImage {
         let WindowImage(target) = target;
         let Gpu { device, queue, .. } = &self.gpu;
         let screen = ScreenDescriptor {
@@ -202,9 +209,14 @@ impl WindowPainter {
                 })
                 .forget_lifetime();
             if let Some(picture) = &picture {
+                // A window that has just been made smaller may not hold all of it.
+                let [width, height] = screen.size_in_pixels.map(|edge| edge as f32);
+                let (area_width, area_height) = (area.width as f32, area.height as f32);
+                pass.set_viewport(0.0, 0.0, area_width.min(width), area_height.min(height), 0.0, 1.0);
                 pass.set_pipeline(&self.present.pipeline);
                 pass.set_bind_group(0, picture, &[]);
                 pass.draw(0..3, 0..1);
+                pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
             }
             self.ui.renderer.render(&mut pass, ui.primitives, &screen);
         }

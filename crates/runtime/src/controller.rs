@@ -34,6 +34,9 @@ const FIRST_PX: f32 = 8.0;
 /// Splats to begin with.
 const FIRST_SPLATS: u64 = 100_000;
 
+/// Splats that any frame may have: where so few take too long, it is not for their number, and a heap of discs would be no faster.
+const LEAST_SPLATS: u64 = 10_000;
+
 /// Holds a frame time while the camera moves; refines while it rests.
 #[derive(Clone, Debug)]
 pub struct FrameRate {
@@ -76,7 +79,7 @@ impl FrameRate {
         }
         let affordable = self.cost.splats_within(self.target_ms);
         let most_splats = affordable.map_or(FIRST_SPLATS, |splats| (splats * CUT_BOUND) as u64);
-        Fineness { threshold_px: self.moving_px, most_splats: most_splats.max(self.coarsest_splats) }
+        Fineness { threshold_px: self.moving_px, most_splats: most_splats.max(self.coarsest_splats).max(LEAST_SPLATS) }
     }
 
     /// Takes note of a frame: how long it took from beginning to end, what it drew, and whether finer pages are on their way.

@@ -12,7 +12,7 @@ use gigalod_runtime::splats::Tint;
 use std::path::PathBuf;
 
 /// Points.
-const WIDTH: f32 = 320.0;
+pub(crate) const WIDTH: f32 = 320.0;
 
 impl Viewer {
     pub(crate) fn panel(&mut self, ui: &mut Ui, now: f64) {
@@ -186,8 +186,8 @@ impl Viewer {
         let mut is_empty = true;
         for found in self.measuring.points() {
             is_empty = false;
-            let point = found.point.to_array().map(|x| digits(x, found.uncertain)).join("  ");
-            ui.add(egui::Label::new(egui::RichText::new(point).monospace()).truncate());
+            let point = found.point.to_array().map(|x| digits(x, found.uncertain)).join("\n");
+            ui.label(egui::RichText::new(point).monospace());
         }
         if is_empty && self.measuring.is_on {
             ui.weak("Click two points of the surface.");

@@ -42,7 +42,7 @@ pub struct Report {
     pub tally: Tally,
     /// Where the camera was at the end.
     pub viewpoint: Viewpoint,
-    /// Of the window, in physical pixels.
+    /// Of the picture, beside the panel, in physical pixels.
     pub size: ImageSize,
     /// What was measured last, if it is still shown.
     pub measured: Option<Measured>,

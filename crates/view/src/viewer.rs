@@ -8,6 +8,7 @@ use crate::jobs::{Finished, Jobs};
 use crate::mailbox::{Figures, Mailbox, ModelKey, News, Order, Wish};
 use crate::measure::Measuring;
 use crate::navigation::{Anchor, Input, Navigation};
+use crate::panel;
 use crate::picker::{Answer, Purpose, Question};
 use crate::recorder::{Recorder, Viewpoint};
 use crate::report::Tally;
@@ -132,10 +133,6 @@ impl Viewer {
     /// One frame of the user interface, for a window of this size in physical pixels.
     pub(crate) fn ui(&mut self, ui: &mut egui::Ui, size: ImageSize) {
         let now = ui.input(|input| input.time);
-        if size.width.min(size.height) > 0 && size != self.size {
-            self.size = size;
-            self.navigation.apply(&Input::Orbit { by_px: DVec2::ZERO }, size);
-        }
         self.collect(now);
         for file in ui.input(|input| input.raw.dropped_files.clone()) {
             self.open(file.path());
@@ -143,6 +140,11 @@ impl Viewer {
         self.keys(ui, now);
         if self.shows_panel {
             self.panel(ui, now);
+        }
+        let free = self.beside_panel(size, ui.ctx().pixels_per_point());
+        if free.width.min(free.height) > 0 && free != self.size {
+            self.size = free;
+            self.navigation.apply(&Input::Orbit { by_px: DVec2::ZERO }, free);
         }
         self.viewport(ui);
         self.overlays(ui, now);
@@ -152,6 +154,13 @@ impl Viewer {
         if self.recorder.is_playing() || self.recorder.is_recording() {
             ui.request_repaint();
         }
+    }
+
+    /// What the panel leaves of a window for the picture: all of one that is too narrow for both.
+    fn beside_panel(&self, window: ImageSize, pixels_per_point: f32) -> ImageSize {
+        let panel_px = if self.shows_panel { (panel::WIDTH * pixels_per_point).round() as u32 } else { 0 };
+        let is_wide = window.width > 2 * panel_px;
+        ImageSize { width: if is_wide { window.width - panel_px } else { window.width }, ..window }
     }
 
     /// Where the camera is at this moment.

@@ -182,19 +182,19 @@ impl Person {
     /// Whether a part of the statue is in the picture: points of its surface, not those that the camera is held by.
     fn sees_the_statue(&mut self) -> bool {
         let viewer = self.harness.state();
-        let camera = viewer.camera(&viewer.own_viewpoint());
+        let (camera, size) = (viewer.camera(&viewer.own_viewpoint()), viewer.size);
         let bounds = viewer.bounds();
         let (middle, half) = (bounds.center(), bounds.extent() * 0.5);
         let mut pages = crate::pick::Pages::default();
         let near = (0..=24).flat_map(|x| (0..=16).map(move |y| (x, y))).any(|(x, y)| {
-            let at = DVec2::new(f64::from(x * SIZE.width) / 24.0, f64::from(y * SIZE.height) / 16.0);
+            let at = DVec2::new(f64::from(x * size.width) / 24.0, f64::from(y * size.height) / 16.0);
             let ray = Ray { origin: camera.eye, direction: camera.ray_through(at) };
             pages.first_hit(&self.files.statue.file, &ray).unwrap().is_some()
         });
         let view = camera.view_point(middle);
         let small = view.z > half.length() && {
             let pixel = camera.pixel_of_view_point(view);
-            pixel.x > 0.0 && pixel.y > 0.0 && pixel.x < f64::from(SIZE.width) && pixel.y < f64::from(SIZE.height)
+            pixel.x > 0.0 && pixel.y > 0.0 && pixel.x < f64::from(size.width) && pixel.y < f64::from(size.height)
         };
         near || small
     }
@@ -262,12 +262,12 @@ fn a_double_click_makes_a_point_of_the_surface_the_pivot() {
     let mut person = Person::opens(&["statue.glod"]);
     let home = person.viewer().own_viewpoint();
     let camera = person.viewer().camera(&home);
-    person.clicks(pos2(470.0, 300.0));
-    person.clicks(pos2(470.0, 300.0));
+    person.clicks(pos2(310.0, 300.0));
+    person.clicks(pos2(310.0, 300.0));
     person.waits_until(|viewer| viewer.own_viewpoint().target != home.target);
     let pivot = person.viewer().own_viewpoint().target;
     let pixel = camera.pixel_of_view_point(camera.view_point(pivot));
-    assert!((pixel - DVec2::new(470.0, 300.0)).length() < 1e-6, "{pixel}: it lay under the cursor");
+    assert!((pixel - DVec2::new(310.0, 300.0)).length() < 1e-6, "{pixel}: it lay under the cursor");
 }
 
 #[test]
@@ -337,7 +337,7 @@ fn a_path_is_recorded_played_and_saved() {
 fn a_distance_is_that_of_the_points_that_were_clicked() {
     let mut person = Person::opens(&["statue.glod"]);
     person.clicks_on("Pick points (M)");
-    for at in [pos2(420.0, 300.0), pos2(560.0, 420.0)] {
+    for at in [pos2(260.0, 300.0), pos2(400.0, 420.0)] {
         person.clicks(at);
         // Two clicks in one place at once would be a double click.
         person.harness.run_steps(60);
@@ -346,7 +346,7 @@ fn a_distance_is_that_of_the_points_that_were_clicked() {
     let viewer = person.viewer();
     let camera = viewer.camera(&viewer.own_viewpoint());
     let points: Vec<DVec3> = viewer.measuring.points().map(|found| found.point).collect();
-    for (point, clicked) in points.iter().zip([DVec2::new(420.0, 300.0), DVec2::new(560.0, 420.0)]) {
+    for (point, clicked) in points.iter().zip([DVec2::new(260.0, 300.0), DVec2::new(400.0, 420.0)]) {
         let pixel = camera.pixel_of_view_point(camera.view_point(*point));
         assert!((pixel - clicked).length() < 1e-6, "{pixel}");
     }

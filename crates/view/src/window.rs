@@ -312,7 +312,7 @@ impl Running {
             Acquired::Hidden => return Ok((Painted::Hidden, 0.0)),
             Acquired::Again => return Ok((Painted::Again, 0.0)),
         };
-        let painted = self.painter.paint(image, shown, ui);
+        let painted = self.painter.paint(image, shown, self.viewer.size, ui);
         let painted_at = thread_cpu_ms();
         self.painter.show(painted)?;
         Ok((Painted::Done, acquired_at - begun + thread_cpu_ms() - painted_at))

@@ -110,6 +110,10 @@ fn open_part(path: &Path, stamp: Stamp) -> Result<Box<dyn ModelStream>, gigalod_
     open_watched_since(Box::new(file), files::side_files(path), stamp, Box::new(move || files::stamp(&watched)))
 }
 
+fn is_named_as_model(path: &Path) -> bool {
+    path.extension().is_some_and(|it| ENDINGS.iter().any(|ending| it.eq_ignore_ascii_case(ending)))
+}
+
 /// Models in a folder, not below it, sorted by name.
 fn models_in(folder: &Path, console: &Console) -> Result<Vec<PathBuf>, CliError> {
     let wrong = |error: io::Error| CliError::in_file(folder, error);
@@ -121,6 +125,14 @@ fn models_in(folder: &Path, console: &Console) -> Result<Vec<PathBuf>, CliError>
     names.sort();
     let mut models = Vec::new();
     for path in names.into_iter().map(|name| folder.join(name)) {
+        // Most folders hold the pictures of materials.
+        let has_models = || {
+            let entries = std::fs::read_dir(&path).into_iter().flatten().flatten();
+            entries.map(|entry| entry.path()).any(|path| is_named_as_model(&path))
+        };
+        if path.is_dir() && has_models() {
+            console.warn(&CliError::in_file(&path, "left out: folders below one are not looked into, name it too"));
+        }
         if !path.is_file() {
             continue;
         }
@@ -128,7 +140,7 @@ fn models_in(folder: &Path, console: &Console) -> Result<Vec<PathBuf>, CliError>
         if let Some(format) = format {
             console.detail(|| format!("{}: {format}", path.display()));
             models.push(path);
-        } else if path.extension().is_some_and(|it| ENDINGS.iter().any(|ending| it.eq_ignore_ascii_case(ending))) {
+        } else if is_named_as_model(&path) {
             console.warn(&CliError::in_file(&path, "left out: no model by its content"));
         }
     }

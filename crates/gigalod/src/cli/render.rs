@@ -158,6 +158,9 @@ fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, subject: &Subject) 
     let (scene, up) = (subject.description.camera.unwrap_or_default(), subject.up());
     let fov_rad = |degrees: Option<f64>| degrees.unwrap_or(DEFAULT_FOV_DEG).to_radians();
     if let (Some(eye), Some(target)) = (args.eye, args.target) {
+        if eye == target {
+            return Err(CliError::usage("--eye and --target are the same point, expected two"));
+        }
         let fov = fov_rad(args.fov.or(scene.fov_deg));
         return Ok(Camera::look_at(eye, target, args.up.unwrap_or(up.direction()), fov, size));
     }

@@ -18,8 +18,13 @@ pub(super) struct Container {
 
 /// True for GLB, and for text that begins as a JSON object does.
 pub(crate) fn recognises(start: &[u8]) -> bool {
-    start.starts_with(b"glTF") || start.trim_ascii_start().starts_with(b"{")
+    let has_key = || KEYS.iter().any(|key| memchr::memmem::find(start, key.as_bytes()).is_some());
+    start.starts_with(b"glTF") || start.trim_ascii_start().starts_with(b"{") && has_key()
 }
+
+/// Of JSON that is glTF, at least one; other JSON has none.
+const KEYS: [&str; 7] =
+    ["\"asset\"", "\"accessors\"", "\"bufferViews\"", "\"buffers\"", "\"meshes\"", "\"nodes\"", "\"scenes\""];
 
 /// Takes a file apart that is [recognised](recognises).
 pub(super) fn open(mut input: Input) -> Result<Container, ImportError> {
