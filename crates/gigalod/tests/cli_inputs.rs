@@ -53,7 +53,9 @@ fn a_folder_is_the_models_in_it_and_they_are_one_model() {
     tiles(&folder);
     let [out, other] = ["a.glod", "b.glod"].map(|name| place.path().join(name));
     let ran = run!["build", folder, "-o", out, "--json"].done();
-    assert_eq!(ran.stderr, "");
+    let below = folder.join("below");
+    let left_out = "left out: folders below one are not looked into, name it too";
+    assert_eq!(ran.stderr, format!("warning: {}: {left_out}\n", below.display()));
     let single = run!["build", statue().ply, "-o", other, "--json"].done().json();
     let count = |report: &Value, what: &str| report["input"][what].as_u64().unwrap();
     assert_eq!(count(&ran.json(), "triangles"), count(&single, "triangles") + 2 * 40 * 40);

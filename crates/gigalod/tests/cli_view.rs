@@ -228,7 +228,8 @@ fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
     // Left of the panel.
     let clicked = [[270, 200], [320, 420]];
     clicked.iter().for_each(|at| viewing.clicks(*at));
-    std::thread::sleep(Duration::from_secs(2));
+    // The original is read in the background, and nothing in the window can be waited for from here.
+    std::thread::sleep(Duration::from_secs(8));
     let figures = viewing.closes();
     let measured = &figures["measured"];
     assert_eq!(measured["uncertain"], 0.0, "{figures}");

@@ -137,8 +137,7 @@ impl Skeleton {
         }
         if !center.is_finite() || !(0.0..=f32::MAX).contains(&radius) || !(1.0..=64.0).contains(&overhang) {
             return Err(invalid(format!(
-                "a root sphere at {} with radius {radius:e} and overhang {overhang:e}, expected finite numbers, a radius ≥ 0, an overhang of 1–64",
-                shown(center.as_dvec3())
+                "a root sphere at {center} with radius {radius} and overhang {overhang}, expected finite numbers, a radius ≥ 0, an overhang of 1–64"
             )));
         }
         let Some(record_bytes) = (bytes.len() - ROOT_BYTES).checked_sub(model_bytes as usize) else {
@@ -229,5 +228,7 @@ impl Skeleton {
 
 /// In a line of bounded length, whatever the numbers.
 fn shown(place: DVec3) -> String {
-    format!("({:e}, {:e}, {:e})", place.x, place.y, place.z)
+    let is_long = |value: f64| value != 0.0 && !(1e-9..1e16).contains(&value.abs());
+    let number = |value: f64| if is_long(value) { format!("{value:e}") } else { value.to_string() };
+    format!("[{}, {}, {}]", number(place.x), number(place.y), number(place.z))
 }
