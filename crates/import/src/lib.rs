@@ -84,10 +84,14 @@ pub trait ModelStream: Send {
     }
 
     /// Number of vertices, where the file says so before they come. Checked against what comes.
-    fn declared_vertices(&self) -> Option<u64>;
+    fn declared_vertices(&self) -> Option<u64> {
+        None
+    }
 
     /// Number of faces (polygons, not triangles), where the file says so before they come.
-    fn declared_faces(&self) -> Option<u64>;
+    fn declared_faces(&self) -> Option<u64> {
+        None
+    }
 
     /// Replaces the contents of `batch` by the next vertices and/or triangles; returns false, with an empty batch, after the
     /// last. Vertices are numbered in the order in which they come; a triangle may come before its vertices.

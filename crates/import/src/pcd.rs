@@ -323,10 +323,6 @@ impl ModelStream for PcdStream {
         UpAxis::Z
     }
 
-    fn declared_vertices(&self) -> Option<u64> {
-        None
-    }
-
     fn declared_faces(&self) -> Option<u64> {
         Some(0)
     }

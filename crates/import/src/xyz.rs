@@ -211,10 +211,6 @@ impl ModelStream for XyzStream {
         UpAxis::Z
     }
 
-    fn declared_vertices(&self) -> Option<u64> {
-        None
-    }
-
     fn declared_faces(&self) -> Option<u64> {
         Some(0)
     }

@@ -115,6 +115,18 @@ pub(crate) fn create_texture(
     format: wgpu::TextureFormat,
     usage: wgpu::TextureUsages,
 ) -> wgpu::Texture {
+    create_texture_seen_as(device, label, size, format, usage, &[])
+}
+
+/// The same, to be looked at in these formats as well.
+pub(crate) fn create_texture_seen_as(
+    device: &wgpu::Device,
+    label: &str,
+    size: ImageSize,
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+    view_formats: &[wgpu::TextureFormat],
+) -> wgpu::Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
@@ -123,7 +135,7 @@ pub(crate) fn create_texture(
         dimension: wgpu::TextureDimension::D2,
         format,
         usage,
-        view_formats: &[],
+        view_formats,
     })
 }
 

@@ -4,6 +4,7 @@
 //! device stays lost, and says so whatever else went wrong.
 
 use crate::RenderError;
+use crate::gbuffer::create_texture_seen_as;
 use gigalod_geom::ImageSize;
 use std::sync::{Arc, Mutex};
 
@@ -178,16 +179,8 @@ impl Gpu {
         usage: wgpu::TextureUsages,
     ) -> wgpu::Texture {
         let bytes = [format.remove_srgb_suffix()];
-        self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: if self.has_view_formats { &bytes } else { &[] },
-        })
+        let view_formats = if self.has_view_formats { &bytes[..] } else { &[] };
+        create_texture_seen_as(&self.device, label, size, format, usage, view_formats)
     }
 
     /// Bytes that a buffer may have, and that a pass can see of it.

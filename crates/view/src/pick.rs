@@ -8,7 +8,7 @@
 
 use crate::navigation::Anchor;
 use gigalod_format::FormatError;
-use gigalod_format::splats::{FamilyPlace, Node, Page, PageId, SplatFile, WordIndex};
+use gigalod_format::splats::{Children, FamilyPlace, Node, Page, PageId, SplatFile, WordIndex};
 use gigalod_geom::Sphere;
 use gigalod_geom::quantise::{normal, sphere};
 use glam::{DVec3, Vec3};
@@ -83,6 +83,36 @@ impl Ord for Entry {
     }
 }
 
+/// One node of a group.
+struct Sibling {
+    node: Node,
+    children: Children,
+    /// Words of the family below the group that its siblings before it take.
+    skipped: u16,
+    ball: Sphere,
+}
+
+/// A group of `count` nodes that begins at a word of a page, below a ball, and the family of their children; `None` where it does
+/// not lie in the page.
+fn siblings<'a>(
+    page: &'a Page,
+    start: usize,
+    count: u8,
+    parent: &'a Sphere,
+) -> Option<(Option<FamilyPlace>, impl Iterator<Item = Sibling> + 'a)> {
+    let end = start + usize::from(count);
+    let words = page.words().get(start..end)?;
+    let family = page.words().get(end).map(|word| page.family(*word));
+    let nodes = words.iter().scan(0, move |before, word| {
+        let node = Node(*word);
+        let children = node.children();
+        let skipped = *before;
+        *before += children.words() as u16;
+        Some(Sibling { node, children, skipped, ball: sphere::decode_with(sphere::table(), parent, node.sphere()) })
+    });
+    Some((family, nodes))
+}
+
 impl Pages {
     fn page(&mut self, file: &SplatFile, page: PageId) -> Result<&Page, FormatError> {
         if self.decoded.len() >= MOST_PAGES && !self.decoded.contains_key(&page) {
@@ -148,16 +178,8 @@ impl Pages {
             };
             let Some(word) = page.family_word(place.family) else { break };
             let start = usize::from(word.0) + usize::from(group_skipped);
-            let end = start + usize::from(count);
-            let Some(words) = page.words().get(start..end) else { break };
-            let family = page.words().get(end).map(|word| page.family(*word));
-            let mut before = 0u16;
-            for word in words {
-                let node = Node(*word);
-                let children = node.children();
-                let skipped = before;
-                before += children.words() as u16;
-                let ball = sphere::decode_with(sphere::table(), &parent, node.sphere());
+            let Some((family, siblings)) = siblings(page, start, count, &parent) else { break };
+            for Sibling { node, children, skipped, ball } in siblings {
                 let center = root.origin + ball.center.as_dvec3();
                 let radius = f64::from(ball.radius);
                 let is_leaf = children.count == 0;
@@ -188,21 +210,12 @@ impl Pages {
         let mut stack = vec![(root.sphere, WordIndex(0), 1u8)];
         let mut visited = 0;
         while let Some((parent, word, count)) = stack.pop() {
-            let start = usize::from(word.0);
-            let end = start + usize::from(count);
-            let Some(words) = page.words().get(start..end) else { break };
-            visited += words.len();
+            let Some((family, siblings)) = siblings(page, usize::from(word.0), count, &parent) else { break };
+            visited += usize::from(count);
             if visited > page.node_count() {
                 break;
             }
-            let family = page.words().get(end).map(|word| page.family(*word));
-            let mut before = 0u16;
-            for word in words {
-                let node = Node(*word);
-                let children = node.children();
-                let skipped = before;
-                before += children.words() as u16;
-                let ball = sphere::decode_with(sphere::table(), &parent, node.sphere());
+            for Sibling { children, skipped, ball, .. } in siblings {
                 let below = family.filter(|below| children.count > 0 && below.page == PageId(0));
                 match below.and_then(|below| page.family_word(below.family)) {
                     Some(first) => stack.push((ball, WordIndex(first.0.saturating_add(skipped)), children.count)),

@@ -331,10 +331,6 @@ impl ModelStream for E57Stream {
         self.system.as_ref()
     }
 
-    fn declared_vertices(&self) -> Option<u64> {
-        None
-    }
-
     fn declared_faces(&self) -> Option<u64> {
         Some(0)
     }

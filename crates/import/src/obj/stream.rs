@@ -233,14 +233,6 @@ impl ModelStream for ObjStream {
         }
     }
 
-    fn declared_vertices(&self) -> Option<u64> {
-        None
-    }
-
-    fn declared_faces(&self) -> Option<u64> {
-        None
-    }
-
     fn next(&mut self, batch: &mut Batch) -> Result<bool, ImportError> {
         batch.clear();
         while !batch.is_full() {

@@ -91,10 +91,6 @@ macro_rules! stream {
                 UpAxis::Z
             }
 
-            fn declared_vertices(&self) -> Option<u64> {
-                None
-            }
-
             fn declared_faces(&self) -> Option<u64> {
                 let faces: fn(&Self) -> Option<u64> = $faces;
                 faces(self)

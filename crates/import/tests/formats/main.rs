@@ -7,6 +7,7 @@ mod sources;
 
 mod georeference;
 mod gltf;
+mod gltf_packed;
 mod make;
 mod many;
 mod obj;
