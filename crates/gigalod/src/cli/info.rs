@@ -136,7 +136,8 @@ mod tests {
     fn bounds_have_as_many_digits_as_say_something() {
         let shown = |min: [f64; 3], max: [f64; 3]| shown_corner(min, &Bounds { min, max });
         assert_eq!(shown([0.1_f32.into(), -0.0, 0.25], [1.0; 3]), "0.1 0 0.25");
-        assert_eq!(shown([635_577.790_000_000_1, 848_882.15, 406.14], [639_000.0; 3]), "635577.79 848882.15 406.14");
+        let georeferenced = shown([635_577.790_000_000_1, 848_882.15, 406.14], [636_977.75, 850_282.1, 615.26]);
+        assert_eq!(georeferenced, "635577.79 848882.15 406.14");
         assert_eq!(shown([1.0 + 1e-9, 2.0, 3.0], [1.0 + 2e-9, 2.0, 3.0]), "1.000000001 2 3");
         assert_eq!(shown([-3e20, 1e19, 5.0], [3e20; 3]), "-300000000000000000000 10000000000000000000 5");
         assert_eq!(shown([0.3, 5.0, 1e-30], [0.3, 5.0, 1e-30]), "0.3 5 0");
