@@ -148,8 +148,13 @@ impl Viewing<'_> {
     }
 
     /// Closes the window; the figures.
-    fn closes(mut self) -> Value {
+    fn closes(self) -> Value {
         self.presses("ctrl+q");
+        self.ends()
+    }
+
+    /// The figures of a window that is being closed.
+    fn ends(mut self) -> Value {
         Ran::of(self.child.take().unwrap().wait_with_output().unwrap()).done().json()
     }
 }
@@ -255,6 +260,38 @@ fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
         let error = (vector(point) - (camera.eye + direction * truth.t)).length() / mesh.bounds().diagonal();
         assert!(error < 1e-6, "{error} of the diagonal");
     }
+}
+
+#[test]
+fn a_window_survives_what_happens_to_it() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    let viewing = screen.view(place.path(), [&statue().glod]);
+    let window = |does: &[&str]| viewing.hand(&[&["search", "--name", "^Gigalod$"], does].concat());
+    viewing.presses("F2");
+    let (_, first) = read_png(&viewing.takes_picture("statue-1.png"));
+    // The device is lost, and with it all that lay there.
+    viewing.presses("F5");
+    let (_, second) = read_png(&viewing.takes_picture("statue-2.png"));
+    assert!(first == second, "another device draws the same");
+    waits_until(|| screen.pixels() == second);
+    window(&["windowunmap", "--sync"]);
+    window(&["windowmap", "--sync", "windowfocus", "--sync"]);
+    waits_until(|| screen.pixels() == second);
+    window(&["windowsize", "--sync", "640", "400"]);
+    let (width, smaller) = read_png(&viewing.takes_picture("statue-3.png"));
+    assert_eq!((width, smaller.len()), (640, 640 * 400));
+    let corner = || {
+        let pixels = screen.pixels();
+        (0..400).all(|y| pixels[y * WIDTH..][..640] == smaller[y * 640..][..640])
+    };
+    waits_until(corner);
+    // Somebody else takes it away.
+    window(&["windowclose"]);
+    let figures = viewing.ends();
+    let problems = figures["problems"].as_array().unwrap();
+    let is_told = problems.len() == 1 && problems[0].as_str().unwrap().contains("lost and opened anew");
+    assert!(is_told, "{problems:?}");
 }
 
 #[test]
