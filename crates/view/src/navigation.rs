@@ -424,14 +424,14 @@ struct Whole {
 
 impl Whole {
     /// How far, as tangents along the picture's axes, the model's middle lies outside of where it would lie had a person zoomed in from a
-    /// view of the whole at some point of the picture: that is the view axis from where the whole just fills the picture, and more
-    /// from nearer or farther.
+    /// view of the whole at some point of the picture: that is all the picture from close by, and its middle from where all of the
+    /// model is seen.
     fn astray(&self, camera: &Camera) -> DVec2 {
         let middle = camera.view_point(self.middle);
         if middle.z <= 0.0 {
             return DVec2::ZERO;
         }
-        let free = camera.tan_half_fov() * (self.fit / middle.z - 1.0).abs();
+        let free = camera.tan_half_fov() * (self.fit / middle.z - 1.0).max(0.0);
         (DVec2::new(middle.x, middle.y).abs() / middle.z - free).max(DVec2::ZERO)
     }
 

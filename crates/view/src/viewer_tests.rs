@@ -432,7 +432,7 @@ fn a_build_that_is_cancelled_takes_its_preview_along() {
 
 #[test]
 fn the_panel_fits_a_small_window_and_says_how_fine_the_picture_is() {
-    let mut person = Person::opens(&[]);
+    let person = Person::opens(&[]);
     assert!(person.harness.query_by_label("nothing to show yet").is_some());
     let mut person = {
         drop(person);
