@@ -84,6 +84,12 @@ impl Screen {
     }
 }
 
+impl Screen {
+    fn pixel(&self, [x, y]: [i32; 2]) -> [u8; 3] {
+        self.pixels()[y as usize * WIDTH + x as usize]
+    }
+}
+
 impl Drop for Screen {
     fn drop(&mut self) {
         let _ = self.server.kill();
@@ -178,6 +184,14 @@ fn waits_until(is_so: impl Fn() -> bool) {
     }
 }
 
+fn is_orange([red, green, blue]: [u8; 3]) -> bool {
+    red > 200 && (140..200).contains(&green) && blue < 100
+}
+
+fn is_green([red, green, blue]: [u8; 3]) -> bool {
+    red < 160 && green > 200 && blue < 160
+}
+
 fn read_png(path: &Path) -> (usize, Vec<[u8; 3]>) {
     let decoder = png::Decoder::new(BufReader::new(std::fs::File::open(path).unwrap()));
     let mut reader = decoder.read_info().unwrap();
@@ -232,9 +246,14 @@ fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
     viewing.presses("m");
     // Left of the panel.
     let clicked = [[270, 200], [320, 420]];
-    clicked.iter().for_each(|at| viewing.clicks(*at));
-    // The original is read in the background, and nothing in the window can be waited for from here.
-    std::thread::sleep(Duration::from_secs(8));
+    for [x, y] in clicked {
+        viewing.clicks([x, y]);
+        waits_until(|| is_orange(screen.pixel([x, y])) || is_green(screen.pixel([x, y])));
+    }
+    // Orange until the original was read, then green.
+    for [x, y] in clicked {
+        waits_until(|| is_green(screen.pixel([x, y])));
+    }
     let figures = viewing.closes();
     let measured = &figures["measured"];
     assert_eq!(measured["uncertain"], 0.0, "{figures}");

@@ -2,7 +2,7 @@
 
 use crate::host::{Kind, Progress};
 use crate::panel::bytes;
-use crate::viewer::Viewer;
+use crate::viewer::{Notice, Viewer};
 use egui::{Align, Align2, Color32, Frame, Layout, ProgressBar, RichText, ScrollArea, Ui, Window, vec2};
 use std::path::Path;
 use std::time::Duration;
@@ -170,35 +170,45 @@ impl Viewer {
         egui::Rect::from_min_size(egui::Pos2::ZERO, size)
     }
 
+    /// The newest piece of news, through which clicks reach the picture, and errors until they are closed.
     fn notices(&mut self, ui: &Ui, now: f64) {
         self.notices.retain(|notice| notice.until > now);
-        if self.notices.is_empty() {
+        let below_recording = if self.recorder.is_recording() { 36.0 } else { 10.0 };
+        let news = egui::Area::new(egui::Id::unique("news")).anchor(Align2::LEFT_TOP, vec2(12.0, below_recording));
+        if let Some(notice) = self.notices.iter().find(|notice| !notice.is_error) {
+            news.interactable(false).show(ui.ctx(), |ui| {
+                bubble(ui, Color32::from_rgb(45, 60, 80), |ui| text_of(ui, notice));
+            });
+            ui.ctx().request_repaint_after(Duration::from_secs_f64((notice.until - now).max(0.02)));
+        }
+        if !self.notices.iter().any(|notice| notice.is_error) {
             return;
         }
-        let mut closed = None;
-        let area = egui::Area::new(egui::Id::unique("notices")).anchor(Align2::LEFT_BOTTOM, vec2(12.0, -12.0));
-        area.show(ui.ctx(), |ui| {
+        let errors = egui::Area::new(egui::Id::unique("errors")).anchor(Align2::LEFT_BOTTOM, vec2(12.0, -12.0));
+        errors.show(ui.ctx(), |ui| {
             ui.set_max_width(620.0);
-            for (at, notice) in self.notices.iter().enumerate() {
-                let fill = if notice.is_error { Color32::from_rgb(110, 30, 30) } else { Color32::from_rgb(45, 60, 80) };
-                Frame::popup(ui.style()).fill(fill).show(ui, |ui| {
-                    ui.horizontal(|ui| {
-                        if ui.small_button("x").clicked() {
-                            closed = Some(at);
-                        }
-                        ui.add(egui::Label::new(RichText::new(&notice.text).color(Color32::WHITE)).wrap());
-                    });
-                });
-            }
+            self.notices.retain(|notice| {
+                notice.is_error.then(|| {
+                    bubble(ui, Color32::from_rgb(110, 30, 30), |ui| {
+                        ui.horizontal(|ui| {
+                            let is_closed = ui.small_button("x").clicked();
+                            text_of(ui, notice);
+                            !is_closed
+                        })
+                        .inner
+                    })
+                }) != Some(false)
+            });
         });
-        if let Some(at) = closed {
-            self.notices.remove(at);
-        }
-        let next = self.notices.iter().map(|notice| notice.until - now).fold(f64::INFINITY, f64::min);
-        if next.is_finite() {
-            ui.ctx().request_repaint_after(Duration::from_secs_f64(next.max(0.02)));
-        }
     }
+}
+
+fn bubble<R>(ui: &mut Ui, fill: Color32, content: impl FnOnce(&mut Ui) -> R) -> R {
+    Frame::popup(ui.style()).fill(fill).show(ui, content).inner
+}
+
+fn text_of(ui: &mut Ui, notice: &Notice) {
+    ui.add(egui::Label::new(RichText::new(&notice.text).color(Color32::WHITE)).wrap().selectable(false));
 }
 
 fn kind_name(kind: Kind) -> &'static str {

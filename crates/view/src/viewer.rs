@@ -428,7 +428,9 @@ impl Viewer {
     }
 
     /// Tells something that may be forgotten.
+    /// Tells news, in the place of older news.
     pub(crate) fn notice(&mut self, text: &str, now: f64) {
+        self.notices.retain(|notice| notice.is_error);
         self.notices.push(Notice { text: text.to_string(), is_error: false, until: now + 6.0 });
     }
 

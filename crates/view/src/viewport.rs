@@ -25,6 +25,10 @@ const SAME_PLACE_PX: f64 = 6.0;
 /// Seconds that a zoom waits for what is under the cursor.
 const LONGEST_SEARCH: f64 = 0.3;
 
+/// Marks of picked points that are known to the leaves' radius only, and of those that lie on the original.
+const UNCERTAIN: Color32 = Color32::from_rgb(255, 170, 60);
+const EXACT: Color32 = Color32::from_rgb(110, 220, 120);
+
 /// Radians that the light turns for each point of a drag.
 const LIGHT_PER_POINT: f64 = 0.01;
 
@@ -208,18 +212,21 @@ impl Viewer {
         self.settings.towards_light = (turn * light).try_normalize();
     }
 
-    /// Picked points, and the distance between them.
+    /// Picked points, and the distance between them; those that are exact in another colour.
     fn draw_measurement(&mut self, ui: &Ui) {
         let now = ui.input(|input| input.time);
         let viewpoint = self.viewpoint(now);
         let camera = self.camera(&viewpoint);
         let scale = ui.ctx().pixels_per_point();
-        let places: Vec<Pos2> =
-            self.measuring.points().filter_map(|found| place(&camera, found.point, scale)).collect();
-        let color = Color32::from_rgb(255, 170, 60);
+        let color = |uncertain| if uncertain > 0.0 { UNCERTAIN } else { EXACT };
+        let places: Vec<(Pos2, Color32)> = self
+            .measuring
+            .points()
+            .filter_map(|found| Some((place(&camera, found.point, scale)?, color(found.uncertain))))
+            .collect();
         let painter = ui.painter();
-        if let ([a, b], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
-            painter.line_segment([*a, *b], Stroke::new(1.5, color));
+        if let ([(a, _), (b, _)], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
+            painter.line_segment([*a, *b], Stroke::new(1.5, color(uncertain)));
             let middle = *a + (*b - *a) * 0.5;
             let text = digits(distance, uncertain);
             let font = FontId::proportional(15.0);
@@ -228,7 +235,7 @@ impl Viewer {
             painter.rect_filled(at.expand(4.0), 4.0, Color32::from_black_alpha(190));
             painter.galley(at.min, galley, Color32::WHITE);
         }
-        for at in places {
+        for (at, color) in places {
             painter.circle(at, 4.0, color, Stroke::new(1.0, Color32::BLACK));
         }
     }
