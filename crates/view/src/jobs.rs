@@ -10,6 +10,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 /// How a job ended.
 pub(crate) enum Finished {
     Opened(JobNumber, Box<Result<Opened, String>>),
+    /// By a person, with the file's name.
+    Cancelled(JobNumber, String),
     Wrote(PathBuf, Result<(), String>),
 }
 
@@ -56,7 +58,11 @@ impl Jobs {
         let work = Work::watched(move || wake());
         let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
         let (host, path, progress) = (self.host.clone(), file.to_owned(), work.clone());
-        let number = self.start(move |number| Finished::Opened(number, Box::new(host.open(&path, &progress))));
+        let called = name.clone();
+        let number = self.start(move |number| match host.open(&path, &progress) {
+            Err(_) if progress.is_cancelled() => Finished::Cancelled(number, called),
+            opened => Finished::Opened(number, Box::new(opened)),
+        });
         self.running.push(Job { number, name, work });
     }
 

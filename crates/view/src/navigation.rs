@@ -72,7 +72,7 @@ pub enum Input {
         /// Pixels dragged.
         by_px: DVec2,
     },
-    /// Comes nearer to what is under the cursor, which stays there.
+    /// Comes nearer to what is under the cursor, or nearest to it, which stays there.
     Zoom {
         /// What is left of the distance: below 1 is nearer.
         factor: f64,
@@ -285,10 +285,16 @@ impl Navigation {
             self.apply(&Input::Anchor(surface), size);
         }
         let (before, camera) = (self.pose, self.camera(size));
-        // What is under the cursor: a known point, or as far away as the pivot.
-        let depth =
-            surface.map(|surface| camera.view_point(surface.at).z).filter(|depth| depth.is_finite() && *depth > 0.0);
-        let depth = depth.unwrap_or(before.distance);
+        // What is under the cursor: a known point; or what is nearest to it, so that nobody goes past the model; or as far away as the pivot.
+        let in_front = |at: DVec3| Some(camera.view_point(at)).filter(|at| at.is_finite() && at.z > 0.0);
+        let beside = |at: DVec3| Some((camera.pixel_of_view_point(in_front(at)?), in_front(at)?.z));
+        let nearest = || {
+            let places = self.all_anchors().filter_map(|anchor| beside(anchor.at));
+            places.min_by(|a, b| a.0.distance_squared(at_px).total_cmp(&b.0.distance_squared(at_px)))
+        };
+        let known = surface.and_then(|surface| in_front(surface.at)).map(|at| (at_px, at.z));
+        let beside_it = || if factor < 1.0 { nearest() } else { None };
+        let (at_px, depth) = known.or_else(beside_it).unwrap_or((at_px, before.distance));
         let fixed = camera.eye + camera.ray_through(at_px) * depth;
         // What is left of the distance at the least; where the eye is too near already, it does not come nearer.
         let least = surface.map_or(0.0, |surface| least_depth(&surface, &camera) / depth).min(1.0);

@@ -151,7 +151,7 @@ impl Viewer {
         let (words, is_done) = self.fineness();
         let color = if is_done { Color32::from_rgb(130, 200, 140) } else { Color32::from_rgb(220, 190, 110) };
         ui.colored_label(color, words);
-        if self.models.is_empty() {
+        if self.models.is_empty() || self.figures.frames == 0 {
             return;
         }
         self.plot(ui);
@@ -173,8 +173,8 @@ impl Viewer {
         let explained = "No point of the surface is drawn farther off than this: the diameter of the largest splat. Where the \
                          data end, as close up, it is larger than asked for";
         let main = [
-            ("largest error", explained, largest),
-            ("typical", "Half of the splats are no larger than this", format!("{:.2} px", figures.typical_px)),
+            ("largest splat", explained, largest),
+            ("typical splat", "Half of the splats are no larger than this", format!("{:.2} px", figures.typical_px)),
             ("splats drawn", "Of all that there are", count(report.drawn)),
             ("frame", "Choosing what to draw, and drawing it", format!("{:.0} ms", figures.frame_ms)),
             ("read", "From the file, so far", bytes(figures.bytes_read)),

@@ -282,14 +282,17 @@ impl Viewer {
         for finished in self.jobs.finished() {
             match finished {
                 Finished::Opened(job, opened) => {
-                    let of_job = |staged: &&Staged| staged.preview.is_some_and(|(number, _)| number == job);
-                    let previews: Vec<ModelKey> = self.models.iter().filter(of_job).map(|staged| staged.key).collect();
+                    let previews = self.previews_of(job);
                     match *opened {
                         Ok(opened) => self.take(opened, !previews.is_empty(), now),
                         Err(error) => self.notice_error(&error),
                     }
                     // Not before the model is there: something is shown all the time.
                     previews.into_iter().for_each(|key| self.remove(key));
+                }
+                Finished::Cancelled(job, name) => {
+                    self.notice(&format!("{name}: cancelled"), now);
+                    self.previews_of(job).into_iter().for_each(|key| self.remove(key));
                 }
                 Finished::Wrote(path, Ok(())) => {
                     self.tally.written.push(path.display().to_string());
@@ -298,6 +301,11 @@ impl Viewer {
                 Finished::Wrote(_, Err(error)) => self.notice_error(&error),
             }
         }
+    }
+
+    fn previews_of(&self, job: JobNumber) -> Vec<ModelKey> {
+        let is_of_job = |staged: &&Staged| staged.preview.is_some_and(|(number, _)| number == job);
+        self.models.iter().filter(is_of_job).map(|staged| staged.key).collect()
     }
 
     /// Shows what was opened; from where a person looks at its preview, if there was one.
@@ -350,8 +358,8 @@ impl Viewer {
         self.next_key += 1;
         self.mailbox.order(Order::Add(key, model.file.clone(), model.placements.clone()));
         let _ = self.ask.send(Question::Add(key, model.clone()));
-        let stem = model.source.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         if self.models.is_empty() {
+            let stem = stem_of(&model.source);
             self.names =
                 Names { picture: format!("{stem}-1.png"), path: format!("{stem}.json"), scene: format!("{stem}.toml") };
         }
@@ -473,6 +481,13 @@ impl Viewer {
     }
 }
 
+/// `a/scan.ply.gz` → `scan`.
+fn stem_of(model: &Path) -> String {
+    let name = model.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 /// `statue-1.png` → `statue-2.png`; a name without a number gets one.
 fn next_name(name: &str) -> String {
     let path = Path::new(name);
@@ -488,7 +503,13 @@ fn next_name(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::next_name;
+    use super::{Path, next_name, stem_of};
+
+    #[test]
+    fn what_is_saved_is_called_as_the_model() {
+        let stems = ["a/scan.ply.gz", "lion.copc.laz", "b"].map(|name| stem_of(Path::new(name)));
+        assert_eq!(stems, ["scan", "lion.copc", "b"]);
+    }
 
     #[test]
     fn names_count_up() {

@@ -109,7 +109,7 @@ impl Viewer {
             let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
             self.mouse(ui, &response);
             self.draw_measurement(ui);
-            if self.models.is_empty() {
+            if self.models.is_empty() || self.figures.frames == 0 {
                 let [r, g, b] = self.settings.background;
                 ui.painter().rect_filled(rect, 0.0, Color32::from_rgb(r, g, b));
                 // Readable on whatever background.
@@ -119,7 +119,7 @@ impl Viewer {
                     ("Drop a model, a scene, a folder or a camera path here", 22.0, -16.0),
                     ("or choose one with Open…", 16.0, 16.0),
                 ];
-                let is_busy = !self.jobs.running().is_empty() || self.folder.is_some();
+                let is_busy = !self.jobs.running().is_empty() || self.folder.is_some() || !self.models.is_empty();
                 for (text, size, down) in texts.into_iter().filter(|_| !is_busy) {
                     let at = rect.center() + egui::vec2(0.0, down);
                     ui.painter().text(at, Align2::CENTER_CENTER, text, FontId::proportional(size), color);

@@ -179,6 +179,22 @@ fn zooming_out_leads_back_to_the_whole_wherever_the_cursor_is() {
 }
 
 #[test]
+fn who_zooms_in_beside_the_model_comes_to_it() {
+    let mut navigation = navigation(DVec3::ZERO, 1.0);
+    for _ in 0..12 {
+        navigation.apply(&Input::Zoom { factor: 0.8, at_px: DVec2::new(600.0, 20.0), surface: None }, SIZE);
+    }
+    let at = pixel(&navigation, DVec3::ZERO);
+    assert!((navigation.eye().length() - 1.0).abs() < 1.0, "{}", navigation.eye());
+    let camera = navigation.camera(SIZE);
+    let seen = sphere(DVec3::ZERO, 1.0, 5000).into_iter().filter(|point| {
+        let at = pixel(&navigation, *point);
+        camera.view_point(*point).z > 0.0 && (0.0..640.0).contains(&at.x) && (0.0..480.0).contains(&at.y)
+    });
+    assert!(seen.count() > 20, "the middle is at {at}");
+}
+
+#[test]
 fn zooming_in_anywhere_and_out_again_there_changes_nothing() {
     for at in [DVec3::new(0.4, -0.5, 0.59_f64.sqrt()), DVec3::new(0.0, 0.9, 0.19_f64.sqrt())] {
         let mut navigation = navigation(DVec3::ZERO, 1.0);
