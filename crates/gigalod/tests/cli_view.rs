@@ -130,8 +130,10 @@ impl Viewing<'_> {
         self.hand(&["sleep", "0.3", "mouseup", button]);
     }
 
+    /// Clicks, and takes the cursor out of the way.
     fn clicks(&self, [x, y]: [i32; 2]) {
-        self.hand(&["mousemove", &x.to_string(), &y.to_string(), "sleep", "0.1", "click", "1"]);
+        let (x, y) = (x.to_string(), y.to_string());
+        self.hand(&["mousemove", &x, &y, "sleep", "0.1", "click", "1", "sleep", "0.1", "mousemove", "20", "560"]);
     }
 
     /// Takes a picture, which is there when nothing gets finer any more.
