@@ -156,13 +156,8 @@ impl Viewing<'_> {
     }
 
     /// Closes the window; the figures.
-    fn closes(self) -> Value {
+    fn closes(mut self) -> Value {
         self.presses("ctrl+q");
-        self.ends()
-    }
-
-    /// The figures of a window that is being closed.
-    fn ends(mut self) -> Value {
         Ran::of(self.child.take().unwrap().wait_with_output().unwrap()).done().json()
     }
 }
@@ -307,9 +302,7 @@ fn a_window_survives_what_happens_to_it() {
         (0..400).all(|y| pixels[y * WIDTH..][..640] == smaller[y * 640..][..640])
     };
     waits_until(corner);
-    // Somebody else takes it away.
-    window(&["windowclose"]);
-    let figures = viewing.ends();
+    let figures = viewing.closes();
     let problems = figures["problems"].as_array().unwrap();
     let is_told = problems.len() == 1 && problems[0].as_str().unwrap().contains("lost and opened anew");
     assert!(is_told, "{problems:?}");

@@ -25,6 +25,9 @@ const FEWEST_SPLATS: u64 = 1000;
 /// Splats that are looked at to tell a typical one, about.
 const SAMPLE: usize = 500;
 
+/// A window that takes longer to paint, or is hidden, is not waited for.
+const LONGEST_PAINTING: Duration = Duration::from_millis(30);
+
 /// How often pages that are being loaded are looked for, while there is nothing else to do.
 const LOOK_FOR_PAGES: Duration = Duration::from_millis(4);
 
@@ -184,13 +187,16 @@ impl Stage {
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
         let frame = Frame { camera: wish.camera, look: wish.look, draws };
         let typical_px = typical_px(&frame);
+        let waited = Instant::now();
+        self.mailbox.wait_until_painted(LONGEST_PAINTING);
+        let waited = waited.elapsed();
         let drawn = self.renderer.draw(&frame);
         self.scene.serve();
         if let Err(error) = drawn {
             self.survive(error, &report);
             return;
         }
-        let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let frame_ms = (begun.elapsed() - waited).as_secs_f64() * 1e3;
         self.control.drew(frame_ms, &report, self.scene.residency().is_loading());
         self.changed = false;
         self.drawn = Some((*wish, report));

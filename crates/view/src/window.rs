@@ -263,6 +263,7 @@ impl Running {
             && self.painted == Some(picture)
             && self.painted_shapes == output.shapes;
         if is_same {
+            self.mailbox.painted(self.viewer.figures.frames);
             // A person drags, and the stage has not caught up: painting the same again would only take its time.
             let next = Instant::now().checked_add(delay.max(LEAST_DELAY)).map_or(Next::Wait, Next::At);
             return Ok(if self.viewer.wants_to_quit { Next::End } else { next });
@@ -274,6 +275,7 @@ impl Running {
         let ui = UiPaint { primitives: &primitives, pixels_per_point: output.pixels_per_point };
         self.painter.take_textures(&output.textures_delta);
         let painted = self.paint(shown.as_ref(), &ui);
+        self.mailbox.painted(self.viewer.figures.frames);
         self.painter.free_textures(&output.textures_delta);
         output.textures_delta.clear();
         let (painted, driver_ms) = match painted {
