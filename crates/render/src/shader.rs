@@ -2,7 +2,8 @@
 //! stands for one of several files: where a pass delivers what it draws.
 
 /// Sources that others import, by name.
-const SHARED: [(&str, &str); 11] = [
+const SHARED: [(&str, &str); 12] = [
+    ("dot.wgsl", include_str!("shader/dot.wgsl")),
     ("light_params.wgsl", include_str!("shader/light_params.wgsl")),
     ("splat_keys_32.wgsl", include_str!("shader/splat_keys_32.wgsl")),
     ("splat_keys_64.wgsl", include_str!("shader/splat_keys_64.wgsl")),

@@ -24,6 +24,7 @@ var<private> frame: PassParams;
 var<private> part: PartParams;
 
 #import splat_store.wgsl
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_target.wgsl

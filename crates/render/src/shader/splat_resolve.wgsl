@@ -21,6 +21,7 @@ override many_parts: bool = true;
 override wants_footprint: bool = true;
 
 #import splat_store.wgsl
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_parts.wgsl
