@@ -51,7 +51,7 @@ fn frame(machine: &Machine, scene: &mut Scene, control: &mut FrameRate, camera: 
         scene.residency_mut().receive(true);
     }
     let area_px = scene.area_px(VIEW, camera);
-    let edge_px = if machine.covered_ms > 0.0 { control.pixel_edge_px(&report, area_px) } else { 1.0 };
+    let edge_px = if machine.covered_ms > 0.0 { control.pixel_edge_px(&report, 0.0, area_px) } else { 1.0 };
     let for_pixels = (machine.picture_ms + machine.covered_ms * area_px) / (edge_px * edge_px);
     let ms = for_pixels + machine.splat_ms * report.drawn as f64;
     control.drew(ms, &report, false);
@@ -105,7 +105,10 @@ fn frames_take_their_time_along_paths_and_a_rested_picture_is_that_of_render() {
         }
         held_back.sort_by(f64::total_cmp);
         let median_ms = held_back[held_back.len() / 2];
-        println!("{kind:?}: {frames} frames, {} held back, median {median_ms:.1} ms, {late} late, pixels up to {widest_px} px", held_back.len());
+        println!(
+            "{kind:?}: {frames} frames, {} held back, median {median_ms:.1} ms, {late} late, pixels up to {widest_px} px",
+            held_back.len()
+        );
         assert!(held_back.len() > 20, "the target was a bound");
         assert_eq!(widest_px > 1.0, machine.covered_ms > 0.0, "{kind:?}: {widest_px}");
         assert!((0.8..1.2).contains(&(median_ms / TARGET_MS)), "{kind:?}: {median_ms} ms");

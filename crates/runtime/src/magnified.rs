@@ -28,7 +28,8 @@ impl Magnified {
     /// pixel at least.
     pub fn new(camera: &Camera, edge_px: f64) -> Self {
         let screen = camera.size;
-        let height = (f64::from(screen.height) / edge_px.max(1.0)).round().clamp(1.0, f64::from(screen.height).max(1.0));
+        let height =
+            (f64::from(screen.height) / edge_px.max(1.0)).round().clamp(1.0, f64::from(screen.height).max(1.0));
         // Not wider than the screen's: what lies beside it may not have been selected.
         let width = (height * screen.aspect() * (1.0 + 1e-12)).floor().clamp(1.0, f64::from(screen.width).max(1.0));
         let size = ImageSize { width: width as u32, height: height as u32 };

@@ -119,8 +119,10 @@ impl Stage {
             self.scene.residency_mut().receive(false);
             let report = self.scene.select(CAMERA, camera, &fineness);
             let select_ms = begun.elapsed().as_secs_f64() * 1e3;
-            let area_px = || self.scene.area_px(CAMERA, camera);
-            let pixel_edge_px = self.control.as_mut().map_or(1.0, |control| control.pixel_edge_px(&report, area_px()));
+            let pixel_edge_px = match &mut self.control {
+                Some(control) => control.pixel_edge_px(&report, select_ms, self.scene.area_px(CAMERA, camera)),
+                None => 1.0,
+            };
             let shown = Magnified::new(camera, pixel_edge_px);
             let draws =
                 self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();

@@ -307,11 +307,7 @@ fn bind(gpu: &Gpu, pipelines: &Pipelines, frame: &KeyedFrame<'_>, chunk: &Chunk)
     } else {
         [&store[..], &[part, all_parts.clone(), buffers.found.entry(9)]].concat()
     };
-    [
-        group(0, computed),
-        group(1, [&drawn[..], &[all_parts, list]].concat()),
-        group(2, resolved),
-    ]
+    [group(0, computed), group(1, [&drawn[..], &[all_parts, list]].concat()), group(2, resolved)]
 }
 
 #[cfg(test)]

@@ -55,6 +55,12 @@ const FIRST_SPLATS: u64 = 100_000;
 /// Splats that any frame may have: where so few take too long, it is not for their number, and a heap of discs would be no faster.
 const LEAST_SPLATS: u64 = 10_000;
 
+/// Splats from which on a cut tells what one costs.
+const USUAL_SPLATS: f64 = 1e5;
+
+/// Weight of the last cut in what is known of them.
+const CUT_GAIN: f64 = 0.25;
+
 /// Edges of pixels to choose from: eighths of an octave, up to two of them, so that a step changes the number of pixels by a fifth.
 const EDGE_STEPS: u32 = 16;
 
@@ -75,7 +81,10 @@ pub struct FrameRate {
     finest_px: f32,
     /// The largest pixels there may be.
     most_edge_step: u32,
+    /// What drawing costs.
     cost: CostModel,
+    /// What the cut costs, for each splat that it draws.
+    cut_splat_ms: f64,
     /// Threshold while the camera moves.
     moving_px: f32,
     /// Splats that the next cut may have.
@@ -84,7 +93,8 @@ pub struct FrameRate {
     asked_px: f32,
     /// Pixels of the last frame while the camera moves.
     edge_step: u32,
-    /// What is being drawn covers so many pixels, as far as is known.
+    /// How long the cut of the frame that is being made took, and how many pixels it covers, as far as is known.
+    cut_ms: f64,
     area_px: Option<f64>,
     resting: bool,
     /// The last frame showed all there is at the finest threshold.
@@ -108,10 +118,12 @@ impl FrameRate {
             finest_px,
             most_edge_step: 0,
             cost: CostModel::default(),
+            cut_splat_ms: 0.0,
             moving_px: first_px,
             most_splats: FIRST_SPLATS,
             asked_px: first_px,
             edge_step: 0,
+            cut_ms: 0.0,
             area_px: None,
             resting: false,
             settled: false,
@@ -128,7 +140,7 @@ impl FrameRate {
     /// How fine the next frame is to be; `moved` says whether it shows anything else than the last one did.
     pub fn next(&mut self, moved: bool) -> Fineness {
         self.resting = !moved;
-        self.area_px = None;
+        (self.cut_ms, self.area_px) = (0.0, None);
         if self.resting {
             self.asked_px = (self.asked_px * REST_STEP).max(self.finest_px);
             return Fineness::px(self.asked_px);
@@ -137,14 +149,15 @@ impl FrameRate {
     }
 
     /// How many pixels of the screen a drawn pixel of this frame is to be wide, at least 1: for [`crate::Magnified::new`]. The cut has
-    /// been made; its splats cover `area_px` pixels of the screen, each by itself ([`crate::Scene::area_px`]). Always 1 at rest, and
-    /// without [`FrameRate::with_larger_pixels`].
-    pub fn pixel_edge_px(&mut self, report: &CutReport, area_px: f64) -> f64 {
-        self.area_px = Some(area_px);
+    /// been made and took `cut_ms` milliseconds; its splats cover `area_px` pixels of the screen, each by itself
+    /// ([`crate::Scene::area_px`]). Always 1 at rest, and without [`FrameRate::with_larger_pixels`].
+    pub fn pixel_edge_px(&mut self, report: &CutReport, cut_ms: f64, area_px: f64) -> f64 {
+        (self.cut_ms, self.area_px) = (cut_ms, Some(area_px));
         if self.resting {
             return 1.0;
         }
-        let time = |step: u32| self.cost.ms(&Work::new(report.drawn as f64, area_px, edge_px(step))) / self.target_ms;
+        let work = |step: u32| Work::new(report.drawn as f64, area_px, edge_px(step));
+        let time = |step: u32| (cut_ms + self.cost.ms(&work(step))) / self.target_ms;
         let now = time(self.edge_step);
         if self.cost.is_known() && !(EDGE_BAND[0]..=EDGE_BAND[1]).contains(&now) {
             let in_time = (0..self.most_edge_step).find(|step| time(*step) <= 1.0);
@@ -162,7 +175,9 @@ impl FrameRate {
         let edge_step = if self.resting { 0 } else { self.edge_step };
         // An empty picture is drawn by other means.
         if report.drawn > 0 {
-            self.cost.learn(&Work::new(splats, area_px, edge_px(edge_step)), frame_ms);
+            self.cost.learn(&Work::new(splats, area_px, edge_px(edge_step)), frame_ms - self.cut_ms);
+            let cut_splat_ms = self.cut_ms / splats.max(USUAL_SPLATS);
+            self.cut_splat_ms += CUT_GAIN * (cut_splat_ms - self.cut_splat_ms);
         }
         // Where a budget does not allow the finest, this is as fine as it gets.
         self.settled = self.resting && self.asked_px <= self.finest_px && !loading;
@@ -196,7 +211,7 @@ impl FrameRate {
     fn plan(&self, edge_step: u32, splats: f64, threshold_px: f64, area_px: f64) -> Plan {
         let covering_ms = self.cost.ms(&Work::new(0.0, area_px, edge_px(edge_step)));
         // Where the pixels alone take too long, a few splats make it no worse.
-        let affordable = ((self.target_ms - covering_ms) / self.cost.splat_ms()).max(1000.0);
+        let affordable = ((self.target_ms - covering_ms) / (self.cost.splat_ms() + self.cut_splat_ms)).max(1000.0);
         let ratio = (splats.max(1.0) / affordable).powf(1.0 / SPLATS_EXPONENT);
         // Where the data are coarser than the threshold, only one that is coarser than the data changes anything.
         let data_px = (area_px / splats.max(1.0) / std::f64::consts::FRAC_PI_4).sqrt() * THRESHOLD_TO_DIAMETER;
@@ -262,7 +277,9 @@ mod tests {
             let report = CutReport { drawn: splats(px) as u64, threshold_px: px, ..CutReport::default() };
             let area_px = splats(px) * diameter(px).powi(2) * 0.785;
             let larger = control.most_edge_step > 0;
-            let edge_px = if larger { control.pixel_edge_px(&report, area_px) } else { 1.0 };
+            // A quarter of what a splat costs is the cut's.
+            let cut_ms = 0.25 * self.splat_ms * splats(px);
+            let edge_px = if larger { control.pixel_edge_px(&report, cut_ms, area_px) } else { 1.0 };
             self.frames += 1;
             let noise = 1.0 + self.noise * f64::from(self.frames).sin();
             let for_pixels = (self.picture_ms + self.covered_ms * area_px) / (edge_px * edge_px);
@@ -284,7 +301,10 @@ mod tests {
                 let detail = 2e6 * turn * (1.0 + 0.5 * (f64::from(frame) * 0.05).sin());
                 let ms = machine.draw(&mut control, view(detail), true).ms;
                 let settled = frame > 20 && !(150..155).contains(&frame);
-                assert!(!settled || (80.0..120.0).contains(&ms), "{ms} ms in frame {frame} of {picture_ms} + {splat_ms}");
+                assert!(
+                    !settled || (80.0..120.0).contains(&ms),
+                    "{ms} ms in frame {frame} of {picture_ms} + {splat_ms}"
+                );
                 late += u32::from(ms > 120.0 && frame > 20);
             }
             assert_eq!(late, 0, "a sudden turn makes a coarse frame, not a late one");

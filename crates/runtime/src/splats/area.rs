@@ -56,10 +56,9 @@ mod tests {
     fn list(sizes: &[f32], in_piece: usize) -> SplatList {
         let balls = sizes.iter().map(|radius| SplatBall { center_in_eye: [0.0, 0.0, -2.0], radius: *radius });
         let balls: Vec<_> = balls.collect();
-        let pieces = balls.chunks(in_piece).map(|balls| SplatPiece {
-            balls: balls.to_vec(),
-            normal_colors: vec![0; balls.len()],
-        });
+        let pieces = balls
+            .chunks(in_piece)
+            .map(|balls| SplatPiece { balls: balls.to_vec(), normal_colors: vec![0; balls.len()] });
         SplatList { pieces: pieces.collect() }
     }
 
