@@ -89,7 +89,7 @@ impl Stage {
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
         self.scene.splats_mut().tint = job.tint;
         let wanted = Fineness::px(job.threshold_px as f32);
-        let Drawn { report, select_ms, frame_ms, what: picture } =
+        let Drawn { report, select_ms, frame_ms, what: picture, .. } =
             self.draw_until(&job.camera, job.look, &wanted, Wait::Converged, Renderer::picture, console)?;
 
         files::write_png(job.output, picture.size, &picture.rgba)?;
