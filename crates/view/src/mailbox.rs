@@ -69,6 +69,8 @@ pub struct Figures {
     pub report: CutReport,
     /// Half of the splats drawn are no larger than this, in pixels: as a sample of them says.
     pub typical_px: f32,
+    /// Pixels of the screen that a drawn one is wide: more than 1 only while the camera moves.
+    pub pixel_edge_px: f64,
     /// From the beginning of the cut to the end of the drawing, on the clock.
     pub frame_ms: f64,
     /// Of these, the cut.

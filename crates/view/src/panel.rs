@@ -182,6 +182,7 @@ impl Viewer {
         rows(ui, "figures", &main);
         let more = [
             ("threshold", "Error that the last frame was cut at", format!("{:.2} px", report.threshold_px)),
+            ("pixels", "Of the screen, that a drawn one is wide", format!("{:.2} px wide", figures.pixel_edge_px)),
             ("to select", "Part of the frame's time", format!("{:.1} ms", figures.select_ms)),
             ("nodes visited", "By that choice", count(report.visited)),
             ("page misses", "Pages that would have made it finer and were not there", count(figures.misses)),
