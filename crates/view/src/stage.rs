@@ -205,6 +205,11 @@ impl Stage {
         let waited = Instant::now();
         self.mailbox.wait_until_painted(LONGEST_PAINTING);
         let waited = waited.elapsed();
+        if !moved && self.mailbox.interrupt().is_set() {
+            // Something else is wished for; what would be drawn in detail is not what a person waits for.
+            self.scene.serve();
+            return;
+        }
         let drawn = self.renderer.draw(&frame);
         self.scene.serve();
         if let Err(error) = drawn {

@@ -14,19 +14,31 @@ use gigalod_import::{Attributes, Batch, ImportError, ModelStream, VertexBatch};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Points of a preview: half as many at least.
-const MOST_POINTS: usize = 200_000;
+/// Which models have previews, and of how many points.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extent {
+    /// Of the model.
+    least_vertices: u64,
+    /// Of the preview; it has half as many at least.
+    most_points: usize,
+}
 
-/// What has fewer vertices is built as soon as a preview would be.
-const LEAST_VERTICES: u64 = 1_000_000;
+impl Extent {
+    /// What has fewer vertices is built as soon as a preview would be.
+    pub(crate) const USUAL: Self = Self { least_vertices: 1_000_000, most_points: 200_000 };
+}
 
 /// Memory of the build.
 const MEMORY_BYTES: u64 = 128 << 20;
 
 /// A preview, and of how many points it is; `None` for small models, and when `is_cancelled`.
-pub(crate) fn of(path: &Path, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(SplatFile, u64)>, CliError> {
+pub(crate) fn of(
+    path: &Path,
+    extent: Extent,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<(SplatFile, u64)>, CliError> {
     let stream = files::open_model(path)?;
-    let Some(points) = sample(stream, is_cancelled).map_err(|error| CliError::import(path, &error))? else {
+    let Some(points) = sample(stream, extent, is_cancelled).map_err(|error| CliError::import(path, &error))? else {
         return Ok(None);
     };
     let number = points.points.positions.len() as u64;
@@ -52,9 +64,13 @@ struct Sample {
     unit: Option<LengthUnit>,
 }
 
-fn sample(mut stream: Box<dyn ModelStream>, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Sample>, ImportError> {
+fn sample(
+    mut stream: Box<dyn ModelStream>,
+    extent: Extent,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<Sample>, ImportError> {
     let declared = stream.declared_vertices().unwrap_or(u64::MAX);
-    if declared < LEAST_VERTICES {
+    if declared < extent.least_vertices {
         return Ok(None);
     }
     let (mut points, mut batch) = (VertexBatch::default(), Batch::default());
@@ -72,7 +88,7 @@ fn sample(mut stream: Box<dyn ModelStream>, is_cancelled: &dyn Fn() -> bool) -> 
             }
         }
         seen += vertices.positions.len() as u64;
-        while points.positions.len() > MOST_POINTS {
+        while points.positions.len() > extent.most_points {
             thin_out(&mut points.positions);
             thin_out(&mut points.normals);
             thin_out(&mut points.colors);
@@ -80,7 +96,7 @@ fn sample(mut stream: Box<dyn ModelStream>, is_cancelled: &dyn Fn() -> bool) -> 
         }
     }
     let (attributes, up, unit) = (stream.attributes(), stream.up_axis(), stream.unit());
-    Ok((seen >= LEAST_VERTICES).then_some(Sample { points, is_done: false, attributes, up, unit }))
+    Ok((seen >= extent.least_vertices).then_some(Sample { points, is_done: false, attributes, up, unit }))
 }
 
 /// Keeps every second.
@@ -133,17 +149,18 @@ mod tests {
             let mut out = std::io::BufWriter::new(std::fs::File::create(&scan).unwrap());
             gigalod_synth::write_statue(options, &mut out, &mut |_, _| {}).unwrap();
         };
+        let extent = Extent { least_vertices: 20_000, most_points: 8_000 };
         write(20_000);
-        assert!(of(&scan, &|| false).unwrap().is_none());
-        write(2_100_000);
-        assert!(of(&scan, &|| true).unwrap().is_none());
-        let (file, points) = of(&scan, &|| false).unwrap().unwrap();
-        assert!((MOST_POINTS as u64 / 2..=MOST_POINTS as u64).contains(&points), "{points}");
+        assert!(of(&scan, extent, &|| false).unwrap().is_none());
+        write(60_000);
+        assert!(of(&scan, extent, &|| true).unwrap().is_none());
+        let (file, points) = of(&scan, extent, &|| false).unwrap().unwrap();
+        assert!((4_000..=8_000).contains(&points), "{points}");
         let root = file.skeleton().root();
         assert_eq!(root.leaves, points);
         let whole = gigalod_import::read_all(&mut *files::open_model(&scan).unwrap(), &mut |_, _| {}).unwrap();
         let bounds = gigalod_geom::Aabb::of(whole.vertices.positions.iter().copied());
         let lost = (bounds.extent() - root.bounds.extent()).max_element() / bounds.diagonal();
-        assert!(lost < 0.01, "{lost}");
+        assert!(lost < 0.02, "{lost}");
     }
 }
