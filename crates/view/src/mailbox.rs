@@ -67,6 +67,8 @@ pub struct Figures {
     pub wish: u64,
     /// Of the cut.
     pub report: CutReport,
+    /// Half of the splats drawn are no larger than this, in pixels: as a sample of them says.
+    pub typical_px: f32,
     /// From the beginning of the cut to the end of the drawing, on the clock.
     pub frame_ms: f64,
     /// Of these, the cut.

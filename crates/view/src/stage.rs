@@ -11,7 +11,7 @@ use crate::mailbox::{Figures, Mail, Mailbox, ModelKey, News, Order, Wish};
 use crate::settings::Settings;
 use gigalod_render::{Frame, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
-use gigalod_runtime::{CutReport, Fineness, FrameRate, Instance, InstanceId, Residency, Scene, ViewId};
+use gigalod_runtime::{CutReport, DrawSource, Fineness, FrameRate, Instance, InstanceId, Residency, Scene, ViewId};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -21,6 +21,9 @@ const CAMERA: ViewId = ViewId(0);
 
 /// Where there is no memory for so few, coarser will not help.
 const FEWEST_SPLATS: u64 = 1000;
+
+/// Splats that are looked at to tell a typical one, about.
+const SAMPLE: usize = 500;
 
 /// How often pages that are being loaded are looked for, while there is nothing else to do.
 const LOOK_FOR_PAGES: Duration = Duration::from_millis(4);
@@ -179,7 +182,9 @@ impl Stage {
         let misses = self.scene.draws(CAMERA).map(|(_, selection)| selection.requests.len() as u64).sum();
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-        let drawn = self.renderer.draw(&Frame { camera: wish.camera, look: wish.look, draws });
+        let frame = Frame { camera: wish.camera, look: wish.look, draws };
+        let typical_px = typical_px(&frame);
+        let drawn = self.renderer.draw(&frame);
         self.scene.serve();
         if let Err(error) = drawn {
             self.survive(error, &report);
@@ -193,6 +198,7 @@ impl Stage {
         let figures = Figures {
             wish: number,
             report,
+            typical_px,
             frame_ms,
             select_ms,
             cpu_ms: thread_cpu_ms() - cpu_begun,
@@ -210,11 +216,7 @@ impl Stage {
 
     fn survive(&mut self, error: RenderError, report: &CutReport) {
         match error {
-            RenderError::DeviceLost(why) => {
-                self.lost = true;
-                self.mailbox.forget_shown();
-                self.mailbox.tell(News::DeviceLost(why));
-            }
+            RenderError::DeviceLost(why) => self.lose(why),
             RenderError::OutOfMemory(why) if report.drawn > FEWEST_SPLATS => {
                 self.most_splats = report.drawn / 2;
                 let text = format!("the graphics device is out of memory, drawn coarser: {why}");
@@ -227,12 +229,23 @@ impl Stage {
         }
     }
 
+    fn lose(&mut self, why: String) {
+        self.lost = true;
+        self.mailbox.forget_shown();
+        self.mailbox.tell(News::DeviceLost(why));
+    }
+
     /// Draws what is shown once more, for a file.
     fn take_pictures(&mut self) {
         let Some((wish, _)) = self.drawn.as_ref().filter(|_| !self.pictures.is_empty() && !self.lost) else { return };
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
         let picture = self.renderer.picture(&Frame { camera: wish.camera, look: wish.look, draws });
+        if let Err(RenderError::DeviceLost(why)) = picture {
+            // The next device draws them.
+            self.lose(why);
+            return;
+        }
         for name in std::mem::take(&mut self.pictures) {
             self.mailbox.tell(match &picture {
                 Ok(picture) => News::Picture(name, picture.size, picture.rgba.clone()),
@@ -249,4 +262,24 @@ impl Stage {
         }
         problems
     }
+}
+
+/// Median diameter of what is drawn, in pixels across the view axis, of a sample; 0 where nothing is.
+fn typical_px(frame: &Frame<'_>) -> f32 {
+    // Sizes and distances are in the same units, those of the model.
+    let pieces = || {
+        let lists = frame.draws.iter().filter_map(|(_, source)| match source {
+            DrawSource::Splats(list) => Some(&list.pieces),
+            _ => None,
+        });
+        lists.flatten().map(|piece| &piece.balls[..])
+    };
+    let step = (pieces().map(<[_]>::len).sum::<usize>() / SAMPLE).max(1);
+    let focal_px = frame.camera.focal_px() as f32;
+    let mut diameters: Vec<f32> = pieces()
+        .flat_map(|balls| balls.iter().step_by(step))
+        .map(|ball| 2.0 * focal_px * ball.radius / glam::Vec3::from_array(ball.center_in_eye).length())
+        .collect();
+    let middle = diameters.len() / 2;
+    if diameters.is_empty() { 0.0 } else { *diameters.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }

@@ -54,11 +54,39 @@ pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u6
     }
     let folder = folder()?;
     let cached = folder.join(format!("{}.glod", key(file, spacing, at)?));
+    remember(file, &cached);
     if cached.is_file() && files::open_splats(&cached).is_ok() {
         return Ok(Found::Built(cached));
     }
     std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
     Ok(Found::NotBuilt(cached))
+}
+
+/// Notes what a file is built as, so that [`was_built`] need not read it. Where that cannot be noted, nothing depends on it.
+fn remember(file: &Path, cached: &Path) {
+    let note = || -> Option<()> {
+        let note = note_of(file, &files::open(file).ok()?)?;
+        std::fs::create_dir_all(note.parent()?).ok()?;
+        std::fs::write(note, cached.file_name()?.as_encoded_bytes()).ok()
+    };
+    let _ = note();
+}
+
+/// True where a file was looked up before, has not been written to since, and what it builds into is there. Told by its name and stamp:
+/// good enough for a list.
+#[cfg(feature = "view")]
+pub(crate) fn was_built(path: &Path, file: &std::fs::File) -> bool {
+    let cached = note_of(path, file).and_then(|note| std::fs::read_to_string(note).ok());
+    cached.is_some_and(|name| folder().is_ok_and(|folder| folder.join(name).is_file()))
+}
+
+/// Where it is noted what a file is built as.
+fn note_of(path: &Path, file: &std::fs::File) -> Option<PathBuf> {
+    let stamp = files::stamp(file).ok()?;
+    let path = path.canonicalize().ok()?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(path.as_os_str().as_encoded_bytes()).update(format!("{stamp:?}").as_bytes());
+    Some(folder().ok()?.join("seen").join(&hasher.finalize().to_hex()[..32]))
 }
 
 fn folder() -> Result<PathBuf, CliError> {
