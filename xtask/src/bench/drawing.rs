@@ -87,6 +87,9 @@ fn selection(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> {
     Ok(())
 }
 
+/// A splat that covers more pixels than these is no point.
+const POINT_PX: f64 = 2.0;
+
 /// Splats through the compute passes and through the pipeline.
 fn rasterising(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> {
     let Model { name, file, .. } = model;
@@ -94,7 +97,13 @@ fn rasterising(bench: &Bench, model: &Model, rows: &mut Vec<Row>) -> Result<()> 
     let rate = |way: &str| number(&report["ways"][way], "points_per_cpu_second_without_upload") / 1e6;
     let (compute, quads) = (rate("compute"), rate("quads"));
     let figure = format!("{:.2} M points drawn at 1 px, {name}", number(&report, "points") / 1e6);
-    rows.push(at_least(figure.clone(), compute, 20.0, "M points a CPU-second"));
+    let pixels = number(&report, "pixels_per_point");
+    if pixels <= POINT_PX {
+        rows.push(at_least(figure.clone(), compute, 20.0, "M points a CPU-second"));
+    } else {
+        // Its points are not points.
+        rows.push(plain(figure.clone(), format!("{compute:.1} M a CPU-second, each of {pixels:.0} pixels")));
+    }
     rows.push(at_least(format!("{figure}: compute to pipeline"), compute / quads, 4.0, "times"));
     Ok(())
 }

@@ -216,7 +216,8 @@ fn summary(frames: &[FrameFigures], on_path: usize, args: &BenchArgs) -> Summary
         }),
         rest: args.target_ms.map(|_| Rest {
             frames: rest.len(),
-            seconds: rest.iter().map(|frame| frame.frame_ms).sum::<f64>() / 1e3,
+            // An empty sum is -0.
+            seconds: rest.iter().map(|frame| frame.frame_ms).sum::<f64>().max(0.0) / 1e3,
             threshold_px: thresholds.last().copied().unwrap_or(finest_px),
             sign_changes: steps.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count(),
         }),

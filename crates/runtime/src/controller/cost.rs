@@ -99,10 +99,10 @@ impl CostModel {
             return;
         }
         let gain = along.map(|value| value / spread);
-        for row in 0..3 {
-            self.ms[row] += gain[row] * (measured - expected);
-            for column in 0..3 {
-                self.covariance[row][column] -= gain[row] * along[column];
+        for (row, gain) in gain.into_iter().enumerate() {
+            self.ms[row] += gain * (measured - expected);
+            for (covariance, along) in std::iter::zip(&mut self.covariance[row], along) {
+                *covariance -= gain * along;
             }
         }
         for at in 0..3 {
