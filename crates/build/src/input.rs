@@ -3,9 +3,11 @@
 use gigalod_format::checksum;
 use gigalod_import::utc;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Tells one input from another, and from itself after a change.
@@ -71,6 +73,63 @@ impl FileIdentity {
             ]
         };
         facts(self).into_iter().zip(facts(other)).find(|(own, others)| own != others)
+    }
+}
+
+/// Files that the input names, such as its materials and textures, as far as they were asked for; shared with who opens them.
+#[derive(Clone, Debug, Default)]
+pub struct SideLog(Arc<Mutex<BTreeSet<PathBuf>>>);
+
+/// Most files that are remembered: names may be hostile.
+const MOST_SIDE_FILES: usize = 1 << 16;
+
+impl SideLog {
+    /// A file was asked for, whether it is there or not.
+    pub fn note(&self, path: &Path) {
+        let mut paths = self.0.lock().expect("nobody panics while holding it");
+        if paths.len() < MOST_SIDE_FILES {
+            paths.insert(path.to_owned());
+        }
+    }
+
+    /// All of them, sorted.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.0.lock().expect("nobody panics while holding it").iter().cloned().collect()
+    }
+}
+
+/// A file that the input names, as it was when it was read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct SideFile {
+    path: String,
+    /// None where there was none to be read.
+    identity: Option<FileIdentity>,
+}
+
+impl SideFile {
+    pub(crate) fn now(path: &Path) -> Self {
+        let path = path.to_string_lossy().into_owned();
+        let file = File::open(&path).and_then(|file| FileIdentity::of(Path::new(&path), &file));
+        Self { path, identity: file.ok() }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        Path::new(&self.path)
+    }
+
+    /// What it was, and what it is now, where that is not the same.
+    pub(crate) fn change(&self) -> Option<(String, String)> {
+        let now = Self::now(self.path());
+        let (there, gone) = (format!("{} there", self.path), format!("{} not there", self.path));
+        match (&self.identity, &now.identity) {
+            (Some(then), Some(now)) => {
+                let of = |what: String| if what == self.path { what } else { format!("{} with {what}", self.path) };
+                then.difference(now).map(|(then, now)| (of(then), of(now)))
+            }
+            (Some(_), None) => Some((there, gone)),
+            (None, Some(_)) => Some((gone, there)),
+            (None, None) => None,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! In: a [`Journal`]. Out: its bytes, with a checksum; or a journal of bytes that are whole. Spools that it names are on disk.
 
 use crate::InputIdentity;
+use crate::input::SideFile;
 use crate::unfinished::SPOOL_SUFFIX;
 use gigalod_format::checksum;
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,8 @@ pub(crate) struct Header {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Journal {
     pub(crate) header: Header,
+    /// Files that the input names; what is not to be asked for again is in the spools.
+    pub(crate) side: Vec<SideFile>,
     /// The last that is finished.
     pub(crate) phase: String,
     /// What the next phase needs, by name.
@@ -41,7 +44,7 @@ pub(crate) struct Extent {
 }
 
 /// First word of each journal; the number changes with the meaning of journals or spools.
-const MAGIC: &str = "gigalod-build-journal-3";
+const MAGIC: &str = "gigalod-build-journal-4";
 
 impl Journal {
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
@@ -85,6 +88,7 @@ impl Header {
 mod tests {
     use super::*;
     use crate::FileIdentity;
+    use std::path::Path;
 
     fn journal() -> Journal {
         let file = |path: &str| FileIdentity { path: path.into(), bytes: 7, modified: (1, 2), ends: [3, 4] };
@@ -92,7 +96,8 @@ mod tests {
         let header = Header { program: "gigalod".into(), input, options: BTreeMap::from([("up".into(), "y".into())]) };
         let spools = BTreeMap::from([("leaves".into(), Extent { records: 5, record_bytes: 20, checksum: 7 })]);
         let state = serde_json::json!({ "origin": [0.1, 1e-300, f64::MAX] });
-        Journal { header, phase: "leaves".into(), spools, state }
+        let side = vec![SideFile::now(Path::new("/nowhere/to be found"))];
+        Journal { header, side, phase: "leaves".into(), spools, state }
     }
 
     #[test]

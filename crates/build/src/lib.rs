@@ -15,8 +15,8 @@ mod unfinished;
 mod work;
 
 pub use error::BuildError;
-pub use input::{FileIdentity, InputIdentity};
-pub use output::Output;
+pub use input::{FileIdentity, InputIdentity, SideLog};
+pub use output::{Output, folder_of};
 pub use progress::{NoProgress, PhaseTime, Progress, Report};
 pub use unfinished::abandon;
 pub use work::{can_continue, work_folder};
@@ -41,6 +41,8 @@ pub struct Options {
     /// What is built. Where it is given, a build that does not fit into memory can be continued by another process: what it
     /// has lies in [`work_folder`].
     pub input: Option<InputIdentity>,
+    /// Files that the input names. Whoever opens them notes them here, so that a build is not continued with others.
+    pub side: SideLog,
     /// Continue what an interrupted build has left, if anything.
     pub resume: bool,
 }
@@ -52,6 +54,15 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { memory_bytes: 2 << 30, threads: 0, up: None, spacing: None, unit: None, input: None, resume: false }
+        Self {
+            memory_bytes: 2 << 30,
+            threads: 0,
+            up: None,
+            spacing: None,
+            unit: None,
+            input: None,
+            side: SideLog::default(),
+            resume: false,
+        }
     }
 }

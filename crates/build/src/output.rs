@@ -32,7 +32,10 @@ impl Output {
         expect_no_folder(path)?;
         let path = &behind_links(path);
         let mut builder = tempfile::Builder::new();
-        let name = path.file_name().map(|name| format!(".{}.", name.to_string_lossy())).unwrap_or_default();
+        // With more of a long name, what comes besides would make it too long.
+        const MOST: usize = 64;
+        let start = |name: &std::ffi::OsStr| name.to_string_lossy().chars().take(MOST).collect::<String>();
+        let name = path.file_name().map(|name| format!(".{}.", start(name))).unwrap_or_default();
         builder.prefix(&name).suffix(".part");
         #[cfg(unix)]
         {
@@ -92,8 +95,8 @@ pub(crate) fn expect_no_folder(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Where a file lies.
-pub(crate) fn folder_of(path: &Path) -> &Path {
+/// The folder that a file lies in: `.` for a bare name.
+pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

@@ -7,6 +7,7 @@
 //! A build that ends without a finished phase removes the folder, and so does one that succeeds.
 
 use crate::BuildError;
+use crate::input::{SideFile, SideLog};
 use crate::journal::{Extent, Header, Journal};
 use crate::output::{behind_links, folder_of, sync_folder};
 use crate::unfinished::{self, Active, SPOOL_SUFFIX, registry};
@@ -20,6 +21,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Work {
     folder: PathBuf,
     header: Header,
+    side: SideLog,
     found: Option<Journal>,
     /// Locked as long as it is open.
     _lock: File,
@@ -46,6 +48,7 @@ impl Work {
     pub(crate) fn open(
         output: &Path,
         header: Header,
+        side: SideLog,
         resume: bool,
         is_needed: bool,
         note: impl Fn(&str),
@@ -69,7 +72,16 @@ impl Work {
                 Some((what, expected, found)) => {
                     return Err(BuildError::OtherBuild { folder, what, expected, found });
                 }
-                None => Some(journal),
+                None => match journal.side.iter().find_map(SideFile::change) {
+                    Some((expected, found)) => {
+                        return Err(BuildError::OtherBuild { folder, what: "with other materials", expected, found });
+                    }
+                    None => {
+                        // They are not asked for again.
+                        journal.side.iter().for_each(|file| side.note(file.path()));
+                        Some(journal)
+                    }
+                },
             },
             Found::Nothing(why) => {
                 again(if existed { why } else { "nothing to continue" });
@@ -86,7 +98,7 @@ impl Work {
             return Ok(None);
         }
         registry.works.push(Active { folder: folder.clone(), can_continue: found.is_some() });
-        Ok(Some(Self { folder, header, found, _lock: lock }))
+        Ok(Some(Self { folder, header, side, found, _lock: lock }))
     }
 
     pub(crate) fn folder(&self) -> &Path {
@@ -128,7 +140,12 @@ impl Work {
         state: Value,
     ) -> io::Result<()> {
         let spools = spools.into_iter().collect();
-        let journal = Journal { header: self.header.clone(), phase: phase.into(), spools, state };
+        let side = match &self.found {
+            // As they were when they were read.
+            Some(journal) => journal.side.clone(),
+            None => self.side.paths().iter().map(|path| SideFile::now(path)).collect(),
+        };
+        let journal = Journal { header: self.header.clone(), side, phase: phase.into(), spools, state };
         let mut registry = registry();
         let new = self.folder.join("journal.new");
         let mut file = File::create(&new)?;

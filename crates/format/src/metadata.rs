@@ -78,6 +78,9 @@ pub struct Metadata {
     pub levels: u32,
     /// Nodes without children.
     pub leaves: u64,
+    /// How many of them repeat another leaf: of points far away from others, so that these are not drawn too large.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub repeated: u64,
     /// Size before entropy coding: the skeleton, nodes, colours, group sizes, and a 16-bit page-relative pointer for each
     /// group that needs one.
     pub raw_bytes: u64,
@@ -95,4 +98,9 @@ pub struct Metadata {
     pub dicing: Option<Dicing>,
     /// Coarse to fine.
     pub per_level: Vec<LevelSummary>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_zero(value: &u64) -> bool {
+    *value == 0
 }

@@ -19,7 +19,7 @@ fn build_and_info_report_exactly_the_keys_of_the_contract() {
         shape(&ran.json()),
         format!(
             "{{cpu_seconds {INPUT} kind leaves levels nodes options{{..}} output_bytes peak_memory_bytes \
-             phases[{{name seconds}}] resumed_after seconds}}"
+             phases[{{name seconds}}] repeated resumed_after seconds}}"
         )
     );
     let ran = run!["--json", "info", statue().glod].done();
@@ -28,7 +28,7 @@ fn build_and_info_report_exactly_the_keys_of_the_contract() {
         format!(
             "{{attributes[] bounds{{max[] min[]}} bytes closed dicing {INPUT} kind leaves levels nodes options{{..}} \
              per_level[{{bytes level max_error nodes points triangles}}] raw_bytes \
-             reference_system units version}}"
+             reference_system repeated units version}}"
         )
     );
 }

@@ -4,7 +4,7 @@
 mod cli_support;
 
 use cli_support::builds::Place;
-use cli_support::{Ran, names_in};
+use cli_support::{Ran, can_draw, names_in};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -78,6 +78,56 @@ fn a_missing_picture_is_noted_and_the_model_is_built() {
     run!["verify", out, "--against", obj].done();
 }
 
+#[test]
+fn a_missing_library_is_warned_of_and_the_model_is_built() {
+    let place = tempfile::tempdir().unwrap();
+    let (obj, out) = (walls(place.path(), 3), place.path().join("a.glod"));
+    let library = place.path().join("walls.mtl");
+    std::fs::remove_file(&library).unwrap();
+    let ran = run!["build", obj, "-o", out, "--spacing", "0.1"].done();
+    let warning = format!("warning: {}: could not be read: ", library.display());
+    assert_eq!(ran.stderr.lines().filter(|line| line.starts_with(&warning)).count(), 1, "{ran:?}");
+    // Of several in one line, one may be missing; a name may have blanks.
+    let text = std::fs::read_to_string(&obj).unwrap();
+    std::fs::write(place.path().join("all walls.mtl"), "newmtl bricks\nKd 1 0 0\n").unwrap();
+    for (line, warnings) in [("mtllib all walls.mtl\n", 0), ("mtllib nothing.mtl\n", 1)] {
+        std::fs::write(&obj, text.replace("mtllib walls.mtl\n", line)).unwrap();
+        let ran = run!["build", obj, "-o", out, "--spacing", "0.1"].done();
+        assert_eq!(ran.stderr.matches("could not be read").count(), warnings, "{line}: {ran:?}");
+    }
+}
+
+/// The picture of a raw model is kept; which files it names is part of what it is.
+#[test]
+fn what_is_in_the_cache_counts_as_long_as_pictures_and_libraries_are_the_same() {
+    if !can_draw() {
+        return;
+    }
+    let place = tempfile::tempdir().unwrap();
+    let obj = walls(place.path(), 3);
+    let render = |model: &Path| {
+        let out = place.path().join("a.png");
+        let ran = run!["render", model, "-o", out, "--size", "160x120", "--spacing", "0.1", "-v"].done();
+        assert!(ran.stderr.contains("built as") != ran.stderr.contains("built before as"), "{ran:?}");
+        (ran.stderr.contains("built as"), std::fs::read(&out).unwrap())
+    };
+    let (is_built, bricks) = render(&obj);
+    assert!(is_built && render(&obj) == (false, bricks.clone()));
+    image::RgbImage::from_pixel(8, 8, image::Rgb([255, 0, 0])).save(place.path().join("bricks.png")).unwrap();
+    let (is_built, red) = render(&obj);
+    assert!(is_built && red != bricks && render(&obj) == (false, red.clone()));
+    std::fs::write(place.path().join("walls.mtl"), "newmtl bricks\nKd 0 0 1\n").unwrap();
+    let (is_built, blue) = render(&obj);
+    assert!(is_built && blue != red);
+    std::fs::remove_file(place.path().join("walls.mtl")).unwrap();
+    assert!(render(&obj).0, "gone");
+    // The same bytes among other files.
+    let other = place.path().join("other");
+    std::fs::create_dir(&other).unwrap();
+    let copy = walls(&other, 3);
+    assert_eq!(render(&copy), (true, bricks));
+}
+
 /// Pictures of the same name in two folders are two.
 #[test]
 fn each_of_several_inputs_has_its_own_pictures() {
@@ -137,11 +187,21 @@ fn interrupted_after_each_phase_a_diced_model_ends_with_the_same_bytes() {
         }
     }
     assert!(phases.iter().map(String::as_str).eq(["leaves", "part of tree", "read", "tree"]), "{phases:?}");
-    // Another spacing is another build.
+    // Another spacing is another build, and so is another picture.
     let place = Place::new();
     let mut child = place.spawn(&obj, &spaced);
     place.kill_after(&mut child, 1, std::time::Duration::ZERO);
     if place.journaled().is_some() {
+        let picture = inputs.path().join("bricks.png");
+        let before = std::fs::read(&picture).unwrap();
+        image::RgbImage::from_pixel(8, 8, image::Rgb([255, 0, 0])).save(&picture).unwrap();
+        let resume = || run!["build", obj, "-o", place.out, "--resume", "--json", spaced[0], spaced[1]];
+        let said = resume().failed(&place.out);
+        assert!(said.contains("with other materials: expected ") && said.contains("bricks.png"), "{said}");
+        std::fs::remove_file(&picture).unwrap();
+        let said = resume().failed(&place.out);
+        assert!(said.contains("bricks.png there, found ") && said.contains("bricks.png not there"), "{said}");
+        std::fs::write(&picture, before).unwrap();
         let said = run!["build", obj, "-o", place.out, "--resume", "--json", "--spacing", "0.06"].failed(&place.out);
         assert!(said.contains("with other options") && said.contains("--spacing 0.05"), "{said}");
         assert_eq!(names_in(place.folder.path()), [".a.glod.build"]);

@@ -27,7 +27,9 @@ fn verify_against_another_model_finds_violations() {
     assert_eq!((ran.status, &found["ok"]), (1, &false.into()));
     assert!(found["measured"]["violations"].as_u64().unwrap() > 0 && !found["problems"][0].is_null(), "{found}");
     assert!(found["measured"]["worst_ratio"].as_f64().unwrap() > 1.0, "{found}");
-    assert!(ran.stderr.starts_with(&format!("warning: {}: ", statue().glod.display())), "{ran:?}");
+    let first = format!("warning: {}: built from another model than the one ", statue().glod.display());
+    assert!(ran.stderr.starts_with(&first), "said before anything is measured: {ran:?}");
+    assert_eq!(ran.stderr.matches("built from another model").count(), 1, "{ran:?}");
     let missing = Path::new("missing.ply");
     run!["verify", statue().glod, "--against", missing, "--json"].failed(missing);
 }
@@ -84,7 +86,7 @@ fn info_tells_what_build_told_and_adds_up() {
         let folder = tempfile::tempdir().unwrap();
         let built = run!["build", model.ply, "-o", folder.path().join("a.glod"), "--json"].done().json();
         let info = run!["info", model.glod, "--json"].done().json();
-        for key in ["kind", "input", "options", "nodes", "levels", "leaves"] {
+        for key in ["kind", "input", "options", "nodes", "levels", "leaves", "repeated"] {
             assert_eq!(info[key], built[key], "{key}");
         }
         assert_eq!(info["bytes"], built["output_bytes"]);

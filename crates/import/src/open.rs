@@ -32,7 +32,7 @@ const FORMATS: &[Format] = &[
     Format { name: "OFF", recognises: |start, _| off::recognises(start), open: |input, _| off::open(input) },
     Format { name: "STL", recognises: stl::recognises, open: |input, _| stl::open(input) },
     Format { name: "OBJ", recognises: |start, _| obj::recognises(start), open: obj::open },
-    Format { name: "XYZ", recognises: |start, _| xyz::recognises(start), open: |input, _| xyz::open(input) },
+    Format { name: "XYZ or PTS", recognises: |start, _| xyz::recognises(start), open: |input, _| xyz::open(input) },
 ];
 
 /// What a recogniser gets to see. Comments may come first in a text file.

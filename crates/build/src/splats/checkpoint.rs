@@ -69,14 +69,16 @@ pub(super) fn save(work: &Work, stage: &Stage) -> io::Result<()> {
         Stage::Leaves(facts, leaves) => work.finish("leaves", [leaves.secure()?], facts.to_json()),
         // Was saved when it was made.
         Stage::Dividing(..) => Ok(()),
-        Stage::Tree(facts, Chunks { kept, colors, sizes, top }) => {
+        Stage::Tree(facts, Chunks { kept, colors, sizes, top, mean_radius }) => {
             let lists = [
                 list(&place, "chunk_sizes", sizes)?,
                 list(&place, "top", &top.nodes)?,
                 list(&place, "top_colors", &top.colors)?,
                 list(&place, "chunk_roots", &top.unit_nodes)?,
             ];
-            work.finish("tree", [kept.secure()?, colors.secure()?].into_iter().chain(lists), facts.to_json())
+            let mut state = facts.to_json();
+            state["mean_radius"] = json!(mean_radius);
+            work.finish("tree", [kept.secure()?, colors.secure()?].into_iter().chain(lists), state)
         }
     }
 }
@@ -191,6 +193,7 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
                     colors: Spool::reopen(work, "kept_colors")?,
                     sizes: unlist(work, &of("sizes"))?,
                     top: KeptTree::default(),
+                    mean_radius: 0.0,
                 },
                 shape: unlist::<u8>(work, &of("shape"))?.iter().map(|is_chunk| *is_chunk != 0).collect(),
                 roots: unlist::<Head>(work, &of("roots"))?,
@@ -210,6 +213,7 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
                     colors: unlist(work, "top_colors")?,
                     unit_nodes: unlist(work, "chunk_roots")?,
                 },
+                mean_radius: of_json(&journal.state, "mean_radius").ok_or_else(odd)?,
             };
             Stage::Tree(facts()?, chunks)
         }

@@ -27,6 +27,8 @@ pub(super) struct Chunks {
     pub(super) sizes: Vec<u32>,
     /// The tree on top of them; lists the chunks' roots and the roots' children too.
     pub(super) top: KeptTree,
+    /// Of all leaves.
+    pub(super) mean_radius: f32,
 }
 
 /// Chunks that are raised, and leaves that are still to be: a place in the work that one can go on from.
@@ -61,6 +63,7 @@ impl Division {
             colors: Spool::named(&plan.place(), "kept_colors")?,
             sizes: vec![],
             top: KeptTree::default(),
+            mean_radius: 0.0,
         };
         let pending = vec![(leaves, extent)];
         Ok(Self { chunks, shape: vec![], roots: vec![], pending, done: 0, sets: 0 })
@@ -88,7 +91,7 @@ pub(super) fn divide(
         }
     }
     let Division { mut chunks, shape, roots, .. } = divider.division;
-    top_of(&shape, &roots, has_colors, &mut chunks.top);
+    chunks.mean_radius = top_of(&shape, &roots, has_colors, &mut chunks.top).mean_radius();
     Ok(chunks)
 }
 
@@ -222,8 +225,8 @@ impl Part {
     }
 }
 
-/// The tree on top of the chunks.
-fn top_of(shape: &[bool], roots: &[Head], has_colors: bool, out: &mut KeptTree) {
+/// The tree on top of the chunks; returns the sums over all leaves.
+fn top_of(shape: &[bool], roots: &[Head], has_colors: bool, out: &mut KeptTree) -> Sums {
     // Backwards through preorder, a stack of subtrees, each with its costs; the left one is on top.
     let mut binaries = Vec::with_capacity(shape.len());
     let mut stack: Vec<(u32, Costs)> = Vec::new();
@@ -244,7 +247,7 @@ fn top_of(shape: &[bool], roots: &[Head], has_colors: bool, out: &mut KeptTree) 
     for head in roots {
         units.push(&head.sphere(), normal::decode(head.normal), head.cos_spread);
     }
-    kept::keep(&binaries, &units, &Roots(roots), has_colors, out);
+    kept::keep(&binaries, &units, &Roots(roots), has_colors, out).sums
 }
 
 struct Roots<'a>(&'a [Head]);

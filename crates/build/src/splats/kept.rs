@@ -41,6 +41,16 @@ impl Kept {
         Children { count: self.children & 7, all_leaves: self.children & 128 != 0 }
     }
 
+    /// Of a leaf.
+    pub(super) fn become_parent_of_two_leaves(&mut self) {
+        self.children = 2 | 128;
+    }
+
+    /// One of the children is no leaf any more.
+    pub(super) fn not_all_leaves(&mut self) {
+        self.children &= 127;
+    }
+
     pub(super) fn pack(&self, code: u16) -> Node {
         Node::pack(code, self.normal, self.cone, self.children())
     }

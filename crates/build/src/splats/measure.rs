@@ -37,17 +37,32 @@ pub(super) struct Sums {
     normal: [f32; 3],
     /// Of the leaves' colours, in linear light.
     color: [f32; 3],
+    /// Of the leaves' radii.
+    radius: f32,
     /// Leaves.
     pub(super) weight: u32,
 }
 
 impl Sums {
-    pub(super) const NOTHING: Self =
-        Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3], normal: [0.0; 3], color: [0.0; 3], weight: 0 };
+    pub(super) const NOTHING: Self = Self {
+        min: [f32::INFINITY; 3],
+        max: [f32::NEG_INFINITY; 3],
+        normal: [0.0; 3],
+        color: [0.0; 3],
+        radius: 0.0,
+        weight: 0,
+    };
 
     pub(super) fn of_leaf(sphere: &Sphere, normal: Vec3, color: Vec3) -> Self {
         let (min, max) = (sphere.center - sphere.radius, sphere.center + sphere.radius);
-        Self { min: min.to_array(), max: max.to_array(), normal: normal.to_array(), color: color.to_array(), weight: 1 }
+        Self {
+            min: min.to_array(),
+            max: max.to_array(),
+            normal: normal.to_array(),
+            color: color.to_array(),
+            radius: sphere.radius,
+            weight: 1,
+        }
     }
 
     pub(super) fn and(&self, other: &Self) -> Self {
@@ -57,8 +72,13 @@ impl Sums {
             max: both(self.max, other.max, f32::max),
             normal: both(self.normal, other.normal, |a, b| a + b),
             color: both(self.color, other.color, |a, b| a + b),
+            radius: self.radius + other.radius,
             weight: self.weight + other.weight,
         }
+    }
+
+    pub(super) fn mean_radius(&self) -> f32 {
+        self.radius / self.weight.max(1) as f32
     }
 
     /// In linear light.

@@ -25,11 +25,13 @@ mod contract;
 mod dice;
 mod divide;
 mod facets;
+mod family;
 mod gather;
 mod join;
 mod kept;
 mod layout;
 mod leaves;
+mod lone;
 mod lower;
 mod measure;
 mod mesh;
@@ -96,7 +98,7 @@ pub fn build(
         Some(identity) => {
             let program = GENERATOR.into();
             let header = Header { program, input: identity.clone(), options: influential.clone() };
-            Work::open(out, header, options.resume, !in_memory, |text| progress.note(text))?
+            Work::open(out, header, options.side.clone(), options.resume, !in_memory, |text| progress.note(text))?
         }
         None => None,
     };
@@ -185,6 +187,7 @@ pub fn build(
         nodes: root.nodes,
         levels: root.levels,
         leaves: root.leaves,
+        repeated: quantised.copies,
         raw_bytes: raw_bytes + skeleton.len() as u64,
         closed,
         bounds: Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() },

@@ -4,6 +4,7 @@
 
 use super::divide::Chunks;
 use super::kept::KeptTree;
+use super::lone::Usual;
 use super::lower::{self, Family, Link, Lowered, Place, Run};
 use super::plan::MemoryPlan;
 use crate::progress::Phases;
@@ -28,8 +29,9 @@ pub(super) struct Quantised {
     pub(super) links: Spool<u32>,
     /// The runs of each chunk.
     pub(super) runs: Vec<Vec<Run>>,
-    /// Number of leaves.
+    /// Number of leaves, and how many of them repeat another one.
     pub(super) leaves: u64,
+    pub(super) copies: u64,
     /// Number of nodes on each level, and the largest decoded radius there.
     pub(super) levels: Vec<(u64, f32)>,
     /// How far decoded descendants reach from a node's centre, in units of its radius; the largest of all nodes, ≥ 1.
@@ -41,13 +43,15 @@ const CHUNKS_AT_ONCE: usize = 8;
 
 pub(super) fn top_down(mut chunks: Chunks, plan: &MemoryPlan<'_>, phases: &Phases<'_>) -> io::Result<Quantised> {
     phases.begin("quantise", chunks.kept.len());
-    let top_tree = std::mem::take(&mut chunks.top);
+    let mut top_tree = std::mem::take(&mut chunks.top);
     let root = top_tree.nodes[0].sphere();
     let mut chunk_of = vec![None; top_tree.nodes.len()];
     for (chunk, node) in top_tree.unit_nodes.iter().enumerate() {
-        chunk_of[*node as usize] = Some(chunk as u32);
+        // Of a single leaf nothing lies elsewhere.
+        chunk_of[*node as usize] = (chunks.sizes[chunk] > 1).then_some(chunk as u32);
     }
-    let top = lower::lower(&top_tree, &root, &Place::Top(&chunk_of));
+    let usual = Usual::of(chunks.mean_radius, root.radius);
+    let top = lower::lower(&mut top_tree, &root, &usual, &Place::Top(&chunk_of));
     let mut out = Quantised {
         root,
         nodes: Spool::new(&plan.place())?,
@@ -57,6 +61,7 @@ pub(super) fn top_down(mut chunks: Chunks, plan: &MemoryPlan<'_>, phases: &Phase
         runs: Vec::with_capacity(chunks.sizes.len()),
         levels: top.levels.clone(),
         leaves: count_leaves(&top.nodes),
+        copies: top.copies,
         overhang: 1.0,
         top,
     };
@@ -87,12 +92,21 @@ pub(super) fn top_down(mut chunks: Chunks, plan: &MemoryPlan<'_>, phases: &Phase
                 }
                 let node = top_tree.unit_nodes[*chunk] as usize;
                 let place = Place::Chunk { level: root_levels[*chunk], model_radius: root.radius };
-                let lowered = lower::lower(&tree, &out.top.decoded[node], &place);
+                let lowered = lower::lower(&mut tree, &out.top.decoded[node], &usual, &place);
                 let reach = lowered.reach(&tree, |_| None);
-                Ok((lowered, reach))
+                let group = 1..=usize::from(tree.nodes[0].children().count);
+                let all_leaves: Vec<bool> = tree.nodes[group].iter().map(|node| node.children().all_leaves).collect();
+                Ok((lowered, reach, all_leaves))
             })
             .collect::<io::Result<Vec<_>>>()?;
-        for (chunk, (lowered, (reach, chunk_overhang))) in batch.iter().zip(lowered) {
+        for (chunk, (lowered, (reach, chunk_overhang), all_leaves)) in batch.iter().zip(lowered) {
+            // The top has written these, whose children the chunk may have taken apart.
+            let first = out.top.first_children[top_tree.unit_nodes[*chunk] as usize] as usize;
+            for (node, all_leaves) in (first..).zip(all_leaves) {
+                if !all_leaves && top_tree.nodes[node].children().all_leaves {
+                    out.top.not_all_leaves(node);
+                }
+            }
             overhang = overhang.max(chunk_overhang);
             reaches.push(reach);
             out.push(lowered, usize::from(root_levels[*chunk]))?;
@@ -100,7 +114,7 @@ pub(super) fn top_down(mut chunks: Chunks, plan: &MemoryPlan<'_>, phases: &Phase
         }
         phases.at(done);
     }
-    let reach_of = |node: usize| chunk_of[node].map(|chunk| reaches[chunk as usize]);
+    let reach_of = |node: usize| chunk_of.get(node).copied().flatten().map(|chunk| reaches[chunk as usize]);
     let (_, top_overhang) = out.top.reach(&top_tree, reach_of);
     // The sum of rounded distances, rounded outwards once more.
     out.overhang = round_up(overhang.max(top_overhang) * (1.0 + 1e-6));
@@ -111,6 +125,7 @@ impl Quantised {
     fn push(&mut self, lowered: Lowered, level: usize) -> io::Result<()> {
         self.nodes.push(&lowered.nodes)?;
         self.leaves += count_leaves(&lowered.nodes);
+        self.copies += lowered.copies;
         self.colors.push(&lowered.colors)?;
         self.families.push(&lowered.families)?;
         let links: Vec<u32> = lowered

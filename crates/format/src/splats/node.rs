@@ -47,6 +47,11 @@ impl Node {
         )
     }
 
+    /// The same where not all children are leaves.
+    pub fn with_inner_children(self) -> Self {
+        Self(self.0 & !1)
+    }
+
     /// Code of [`gigalod_geom::quantise::sphere`].
     pub fn sphere(self) -> u16 {
         (self.0 >> 19) as u16

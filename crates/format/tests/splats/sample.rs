@@ -70,6 +70,7 @@ fn sample() -> (Tree, Root, Metadata) {
         nodes: 7,
         levels: 3,
         leaves: 5,
+        repeated: 0,
         raw_bytes: 144 + 58,
         closed: false,
         bounds: Bounds { min: root.bounds.min.to_array(), max: root.bounds.max.to_array() },

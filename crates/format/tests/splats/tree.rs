@@ -244,6 +244,7 @@ pub(crate) fn metadata(tree: &Tree) -> Metadata {
         nodes: root.nodes,
         levels: root.levels,
         leaves: root.leaves,
+        repeated: 0,
         raw_bytes: 1,
         closed: root.closed,
         bounds: Bounds { min: root.bounds.min.to_array(), max: root.bounds.max.to_array() },

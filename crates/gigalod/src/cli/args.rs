@@ -80,8 +80,8 @@ pub(crate) struct BuildOptions {
     /// Most memory to use, as 512MiB or 4GB; at least 64MiB
     #[arg(long, default_value = "2GiB", value_parser = parse::memory, value_name = "SIZE")]
     pub(crate) memory: u64,
-    /// Worker threads [default: one for each core]
-    #[arg(long, default_value = "0", hide_default_value = true, value_parser = parse::threads, value_name = "N")]
+    /// Worker threads; 0 for one on each core
+    #[arg(long, default_value = "0", value_parser = parse::threads, value_name = "N")]
     pub(crate) threads: usize,
     /// Sample triangles that are larger than this so finely, in the model's units [default: what suits the model]
     ///

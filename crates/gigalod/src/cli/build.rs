@@ -1,18 +1,20 @@
 //! `gigalod build`.
 
 use super::args::{BuildArgs, BuildOptions, UpAxisArg};
+use super::cache;
 use super::error::{CliError, Outcome};
 use super::files;
 use super::inputs::{Inputs, Sense};
 use super::parse::readable_bytes;
 use super::progress::Console;
 use super::usage::Usage;
-use gigalod_build::{BuildError, Options, Report};
+use gigalod_build::{BuildError, Options, Report, SideLog};
 use gigalod_format::InputCounts;
 use gigalod_geom::camera::UpAxis;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
 /// A model of fewer vertices is hardly a scan.
 const FEW_VERTICES: u64 = 5_000;
@@ -26,6 +28,7 @@ struct BuildReport<'a> {
     nodes: u64,
     levels: u32,
     leaves: u64,
+    repeated: u64,
     output_bytes: u64,
     seconds: f64,
     cpu_seconds: f64,
@@ -64,6 +67,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         nodes: metadata.nodes,
         levels: metadata.levels,
         leaves: metadata.leaves,
+        repeated: metadata.repeated,
         output_bytes: report.output_bytes,
         seconds,
         cpu_seconds,
@@ -122,7 +126,8 @@ pub(crate) fn build(
     recovery: Recovery,
     console: &Console,
 ) -> Result<Report, CliError> {
-    let (stream, identity) = inputs.open(sense)?;
+    let side = SideLog::default();
+    let (stream, identity) = inputs.open(sense, &side, console)?;
     let options = Options {
         memory_bytes: options.memory,
         threads: options.threads,
@@ -130,13 +135,37 @@ pub(crate) fn build(
         unit: sense.unit,
         spacing: options.spacing,
         input: (recovery != Recovery::Lost).then_some(identity),
+        side: side.clone(),
         resume: recovery == Recovery::Resume,
     };
     let work = console.work(&inputs.name().file_name().unwrap_or_default().to_string_lossy());
-    gigalod_build::splats::build(stream, &options, &work, output).map_err(|error| {
+    let built = gigalod_build::splats::build(stream, &options, &work, output).map_err(|error| {
         let is_ours = !matches!(error, BuildError::Busy { .. } | BuildError::OtherBuild { .. });
         let error = CliError::build(inputs.name(), output, &error);
         let stays = is_ours && recovery != Recovery::Lost && gigalod_build::can_continue(output);
         if stays { error.hint(CONTINUE) } else { error }
-    })
+    })?;
+    warn_of_libraries(&side, console);
+    cache::remember(inputs, output, &side)?;
+    Ok(built)
+}
+
+/// Pictures that are missing were told of when they were asked for; a missing library of materials changes only looks, too.
+fn warn_of_libraries(side: &SideLog, console: &Console) {
+    let paths = side.paths();
+    let is_library = |path: &&PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mtl"));
+    let is_there = |path: &Path| File::open(path).is_ok();
+    for missing in paths.iter().filter(is_library).filter(|path| !is_there(path)) {
+        // A line may name several, which were then asked for one by one.
+        let name = missing.to_string_lossy();
+        let is_several = paths
+            .iter()
+            .any(|path| is_there(path) && name.ends_with(&*path.file_name().unwrap_or_default().to_string_lossy()));
+        if !is_several {
+            console.warn(&CliError::in_file(
+                missing,
+                "could not be read: colours and pictures of its materials are not shown",
+            ));
+        }
+    }
 }

@@ -1,4 +1,7 @@
 //! Raw models built on the way to a picture are kept in the user's cache, keyed by their contents and the build options.
+//!
+//! Which other files a model names, such as textures, is known when it is built. So beside each built file lies a list of them with
+//! their checksums: what was built counts only as long as these are the same, and is built again under the same name otherwise.
 
 use super::args::BuildOptions;
 use super::build::{Recovery, build};
@@ -6,7 +9,8 @@ use super::error::CliError;
 use super::files;
 use super::inputs::{Inputs, Sense};
 use super::progress::Console;
-use gigalod_build::Progress;
+use gigalod_build::{Progress, SideLog};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -54,8 +58,8 @@ pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u6
     }
     let folder = folder()?;
     let cached = folder.join(format!("{}.glod", key(file, spacing, at)?));
-    remember(file, &cached);
-    if cached.is_file() && files::open_splats(&cached).is_ok() {
+    note_place(file, &cached);
+    if cached.is_file() && files::open_splats(&cached).is_ok() && names_the_same(file, &list_of(&cached)) {
         return Ok(Found::Built(cached));
     }
     std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
@@ -63,7 +67,7 @@ pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u6
 }
 
 /// Notes what a file is built as, so that [`was_built`] need not read it. Where that cannot be noted, nothing depends on it.
-fn remember(file: &Path, cached: &Path) {
+fn note_place(file: &Path, cached: &Path) {
     let note = || -> Option<()> {
         let note = note_of(file, &files::open(file).ok()?)?;
         std::fs::create_dir_all(note.parent()?).ok()?;
@@ -87,6 +91,44 @@ fn note_of(path: &Path, file: &std::fs::File) -> Option<PathBuf> {
     let mut hasher = blake3::Hasher::new();
     hasher.update(path.as_os_str().as_encoded_bytes()).update(format!("{stamp:?}").as_bytes());
     Some(folder().ok()?.join("seen").join(&hasher.finalize().to_hex()[..32]))
+}
+
+/// The list beside a built file.
+fn list_of(cached: &Path) -> PathBuf {
+    cached.with_extension("files.json")
+}
+
+/// By names relative to the model: checksums of their contents; none of those that could not be read.
+type SideSums = BTreeMap<String, Option<String>>;
+
+/// Writes the list of files that a model named while it was built, if it was built into the cache.
+pub(crate) fn remember(inputs: &Inputs, output: &Path, side: &SideLog) -> Result<(), CliError> {
+    let ([model], Ok(folder)) = (&inputs.files()[..], folder()) else { return Ok(()) };
+    if output.parent() != Some(&folder) {
+        return Ok(());
+    }
+    let beside = model.parent().unwrap_or(Path::new(""));
+    let name = |path: &PathBuf| path.strip_prefix(beside).ok().map(|name| name.to_string_lossy().into_owned());
+    let names = side.paths().iter().filter_map(name).collect::<Vec<_>>();
+    let sums: SideSums = names.into_iter().map(|name| (name.clone(), sum_of(&beside.join(&name)))).collect();
+    let list = list_of(output);
+    let text = serde_json::to_vec(&sums).expect("names and sums are plain data");
+    files::write_atomically(&list, |out| out.write_all(&text).map_err(|error| CliError::write(&list, &error)))
+}
+
+/// True where all files that a model names are what they were when it was built.
+fn names_the_same(model: &Path, list: &Path) -> bool {
+    let Some(sums) = std::fs::read(list).ok().and_then(|text| serde_json::from_slice::<SideSums>(&text).ok()) else {
+        return false;
+    };
+    let beside = model.parent().unwrap_or(Path::new(""));
+    sums.into_iter().all(|(name, sum)| sum_of(&beside.join(name)) == sum)
+}
+
+fn sum_of(path: &Path) -> Option<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(files::open(path).ok()?).ok()?;
+    Some(hasher.finalize().to_hex()[..32].to_string())
 }
 
 fn folder() -> Result<PathBuf, CliError> {

@@ -48,9 +48,16 @@ impl CliError {
     pub(crate) fn write(file: &Path, error: &io::Error) -> Self {
         // The system's own words would name a temporary file that nobody asked for.
         match error.kind() {
-            io::ErrorKind::NotFound => Self::in_file(file, "could not write: the folder does not exist"),
+            io::ErrorKind::NotFound if !gigalod_build::folder_of(file).is_dir() => {
+                Self::in_file(file, "could not write: the folder does not exist")
+            }
+            io::ErrorKind::NotFound => Self::in_file(file, "could not write: the folder takes no new files"),
+            io::ErrorKind::InvalidFilename => Self::in_file(file, "could not write: the name is too long"),
             io::ErrorKind::PermissionDenied => Self::in_file(file, "could not write: permission denied"),
-            _ => Self::in_file(file, format!("could not write: {error}")),
+            _ => {
+                let said = error.to_string();
+                Self::in_file(file, format!("could not write: {}", said.split(" at path \"").next().unwrap_or(&said)))
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! Opening and writing files.
 
 use super::error::CliError;
-use gigalod_build::FileIdentity;
+use gigalod_build::{FileIdentity, SideLog};
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, FileStore};
 use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
@@ -12,17 +12,18 @@ use std::sync::Arc;
 
 /// Opens a raw model.
 pub(crate) fn open_model(path: &Path) -> Result<Box<dyn ModelStream>, CliError> {
-    Ok(open_input(path)?.0)
+    Ok(open_input(path, &SideLog::default())?.0)
 }
 
-/// Opens a raw model, and says which it is.
-pub(crate) fn open_input(path: &Path) -> Result<(Box<dyn ModelStream>, FileIdentity), CliError> {
+/// Opens a raw model, and says which it is; `side` is told of the files that it names.
+pub(crate) fn open_input(path: &Path, side: &SideLog) -> Result<(Box<dyn ModelStream>, FileIdentity), CliError> {
     let wrong = |error: io::Error| CliError::in_file(path, error);
     let file = open(path)?;
+    expect_raw(path)?;
     let identity = FileIdentity::of(path, &file).map_err(wrong)?;
     let watched = file.try_clone().map_err(wrong)?;
     let ask = Box::new(move || stamp(&watched));
-    let stream = gigalod_import::open_watched(Box::new(file), side_files(path), ask)
+    let stream = gigalod_import::open_watched(Box::new(file), side_files(path, side), ask)
         .map_err(|error| CliError::import(path, &error))?;
     Ok((stream, identity))
 }
@@ -33,8 +34,9 @@ pub(crate) fn stamp(file: &File) -> io::Result<Stamp> {
     Ok(Stamp { bytes: metadata.len(), modified: metadata.modified()? })
 }
 
-/// Opens files that a model names: only those in its folder and below, since a model may come from anywhere.
-pub(crate) fn side_files(path: &Path) -> Box<dyn SideFiles> {
+/// Opens files that a model names: only those in its folder and below, since a model may come from anywhere. `side` is told of them.
+pub(crate) fn side_files(path: &Path, side: &SideLog) -> Box<dyn SideFiles> {
+    let side = side.clone();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     Box::new(move |name: &str| -> io::Result<Box<dyn ByteSource>> {
         // Programs for Windows write its separators.
@@ -45,6 +47,7 @@ pub(crate) fn side_files(path: &Path) -> Box<dyn SideFiles> {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "not in the folder of the model"));
         }
         let path = folder.join(name);
+        side.note(&path);
         if !std::fs::metadata(&path)?.is_file() {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
         }
@@ -66,12 +69,25 @@ pub(crate) fn open_splats(path: &Path) -> Result<SplatFile, CliError> {
 
 /// True when the file begins as a `.glod` file does; anything else is taken for a raw model.
 pub(crate) fn is_container(path: &Path) -> Result<bool, CliError> {
+    Ok(begins_as_container(path)? || path.extension().is_some_and(|extension| extension == "glod"))
+}
+
+fn begins_as_container(path: &Path) -> Result<bool, CliError> {
     let mut start = Vec::new();
     open(path)?
         .take(gigalod_format::MAGIC.len() as u64)
         .read_to_end(&mut start)
         .map_err(|error| CliError::in_file(path, error))?;
-    Ok(start == gigalod_format::MAGIC || path.extension().is_some_and(|extension| extension == "glod"))
+    Ok(start == gigalod_format::MAGIC)
+}
+
+/// Refuses what was built already.
+pub(crate) fn expect_raw(path: &Path) -> Result<(), CliError> {
+    if begins_as_container(path)? {
+        let wrong = CliError::in_file(path, "already a .glod file, expected a model to build one from");
+        return Err(wrong.hint("render and view take it as it is"));
+    }
+    Ok(())
 }
 
 /// Opens a regular file for reading.
@@ -82,8 +98,12 @@ pub(crate) fn open(path: &Path) -> Result<File, CliError> {
 
 /// Asked before a file is opened: to open a pipe that nobody writes to would never end.
 fn expect_regular(path: &Path) -> Result<(), CliError> {
-    let is_file = std::fs::metadata(path).map_err(|error| CliError::in_file(path, error))?.is_file();
-    if is_file { Ok(()) } else { Err(CliError::in_file(path, "not a regular file")) }
+    let metadata = std::fs::metadata(path).map_err(|error| CliError::in_file(path, error))?;
+    if metadata.is_dir() {
+        let wrong = CliError::in_file(path, "a folder, expected a file");
+        return Err(wrong.hint("`gigalod build` makes one model of all that are in a folder"));
+    }
+    if metadata.is_file() { Ok(()) } else { Err(CliError::in_file(path, "not a regular file")) }
 }
 
 /// Refuses an output that would take the place of one of `inputs`, or of a device or pipe. Folders are refused when it comes
@@ -91,6 +111,10 @@ fn expect_regular(path: &Path) -> Result<(), CliError> {
 pub(crate) fn check_output(output: &Path, inputs: &[&Path]) -> Result<(), CliError> {
     if output.as_os_str().as_encoded_bytes().ends_with(b"/") {
         return Err(CliError::in_file(output, "the name of a folder, expected that of a file"));
+    }
+    if output == Path::new("-") {
+        let wrong = CliError::in_file(output, "standard output is no place for it, expected the name of a file");
+        return Err(wrong.hint("a file of that name is ./-"));
     }
     let Ok(metadata) = std::fs::metadata(output) else { return Ok(()) };
     if !metadata.is_file() && !metadata.is_dir() {

@@ -20,6 +20,7 @@ struct InfoReport<'a> {
     nodes: u64,
     levels: u32,
     leaves: u64,
+    repeated: u64,
     bytes: u64,
     raw_bytes: u64,
     closed: bool,
@@ -45,6 +46,7 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
         nodes: metadata.nodes,
         levels: metadata.levels,
         leaves: metadata.leaves,
+        repeated: metadata.repeated,
         bytes,
         raw_bytes: metadata.raw_bytes,
         closed: metadata.closed,
@@ -77,7 +79,11 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     let inner = metadata.nodes - metadata.leaves.min(metadata.nodes);
     let branching = if inner == 0 { 0.0 } else { (metadata.nodes - 1) as f64 / inner as f64 };
     line("nodes", format!("{} on {} levels, {branching:.2} children each", metadata.nodes, metadata.levels));
-    line("leaves", metadata.leaves.to_string());
+    let repeated = match metadata.repeated {
+        0 => String::new(),
+        repeated => format!(", {repeated} of them repeated: isolated ones, to be as small as they are"),
+    };
+    line("leaves", format!("{}{repeated}", metadata.leaves));
     let per_leaf = |bytes: u64| bytes as f64 / metadata.leaves.max(1) as f64;
     line("size", format!("{} ({:.2} bytes a leaf)", readable_bytes(bytes), per_leaf(bytes)));
     line(
@@ -87,7 +93,7 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     line("attributes", metadata.attributes.join(", "));
     line("closed", if metadata.closed { "yes: backs are hidden" } else { "no: drawn from both sides" }.into());
     let unit = json.units.map(shown).unwrap_or_default();
-    let [min, max] = [metadata.bounds.min, metadata.bounds.max].map(|[x, y, z]| format!("{x} {y} {z}"));
+    let [min, max] = [metadata.bounds.min, metadata.bounds.max].map(|corner| shown_corner(corner, &metadata.bounds));
     line("bounds", format!("{min} to {max} {unit}").trim_end().to_owned());
     if let Some(ReferenceSystem { name, epsg, wkt }) = &metadata.reference_system {
         let number = epsg.map(|epsg| format!("EPSG:{epsg}"));
@@ -102,7 +108,37 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     Ok(Outcome::new(&json, text))
 }
 
+/// A corner of the bounds in as many digits as say something: single precision has seven of the model's size.
+fn shown_corner(corner: [f64; 3], bounds: &Bounds) -> String {
+    let extent = (0..3).map(|axis| bounds.max[axis] - bounds.min[axis]).fold(0.0, f64::max);
+    let decimals = if extent > 0.0 { (7.0 - extent.log10().ceil()).clamp(0.0, 17.0) as usize } else { 17 };
+    let number = |value: f64| {
+        let exact = value.to_string();
+        let rounded = format!("{value:.decimals$}");
+        let rounded =
+            if rounded.contains('.') { rounded.trim_end_matches('0').trim_end_matches('.') } else { &rounded };
+        let rounded = if rounded == "-0" { "0" } else { rounded };
+        if rounded.len() < exact.len() { rounded.to_owned() } else { exact }
+    };
+    corner.map(number).join(" ")
+}
+
 /// A stranger's words: they shall not steer the terminal.
 pub(crate) fn shown(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_have_as_many_digits_as_say_something() {
+        let shown = |min: [f64; 3], max: [f64; 3]| shown_corner(min, &Bounds { min, max });
+        assert_eq!(shown([0.1_f32.into(), -0.0, 0.25], [1.0; 3]), "0.1 0 0.25");
+        assert_eq!(shown([635_577.790_000_000_1, 848_882.15, 406.14], [639_000.0; 3]), "635577.79 848882.15 406.14");
+        assert_eq!(shown([1.0 + 1e-9, 2.0, 3.0], [1.0 + 2e-9, 2.0, 3.0]), "1.000000001 2 3");
+        assert_eq!(shown([-3e20, 1e19, 5.0], [3e20; 3]), "-300000000000000000000 10000000000000000000 5");
+        assert_eq!(shown([0.3, 5.0, 1e-30], [0.3, 5.0, 1e-30]), "0.3 5 0");
+    }
 }

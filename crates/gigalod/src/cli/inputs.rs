@@ -8,7 +8,7 @@
 use super::error::CliError;
 use super::files;
 use super::progress::Console;
-use gigalod_build::{FileIdentity, InputIdentity};
+use gigalod_build::{FileIdentity, InputIdentity, SideLog};
 use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use gigalod_import::{ModelStream, OpenPart, Part, Stamp, Together, format_of, open_all, open_watched_since};
@@ -17,6 +17,7 @@ use std::collections::HashSet;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 
 /// Files that are one model.
 pub(crate) struct Inputs {
@@ -78,36 +79,78 @@ impl Inputs {
         self.files.iter().map(PathBuf::as_path).collect()
     }
 
-    /// Opens the model, and says which it is.
-    pub(crate) fn open(&self, sense: Sense) -> Result<(Box<dyn ModelStream>, InputIdentity), CliError> {
+    /// Opens the model, and says which it is; `side` is told of the files that it names.
+    pub(crate) fn open(
+        &self,
+        sense: Sense,
+        side: &SideLog,
+        console: &Console,
+    ) -> Result<(Box<dyn ModelStream>, InputIdentity), CliError> {
         if let [file] = &self.files[..] {
-            let (stream, identity) = files::open_input(file)?;
+            let (stream, identity) = files::open_input(file, side)?;
             return Ok((stream, InputIdentity { files: vec![identity] }));
         }
+        let units = Units::default();
         let (parts, identities): (Vec<Part>, Vec<FileIdentity>) =
-            self.files.iter().map(|file| part(file)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+            self.files.iter().map(|file| part(file, side, &units)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let together = Together { up: sense.up, unit: sense.unit, plain_color: MATERIAL_SRGB };
         let stream = open_all(parts, &together).map_err(|error| CliError::import(&self.name, &error))?;
+        if sense.unit.is_none() {
+            units.warn(console);
+        }
         Ok((stream, InputIdentity { files: identities }))
     }
 }
 
+/// What files say a length of 1 is, in the order in which they were opened.
+#[derive(Clone, Default)]
+struct Units(Arc<Mutex<Vec<(PathBuf, Option<LengthUnit>)>>>);
+
+impl Units {
+    fn note(&self, path: &Path, unit: Option<LengthUnit>) {
+        self.0.lock().expect("nobody panics while holding it").push((path.to_owned(), unit));
+    }
+
+    /// Those that say different ones were refused.
+    fn warn(&self, console: &Console) {
+        let known = self.0.lock().expect("nobody panics while holding it");
+        let said = known.iter().find_map(|(path, unit)| Some((path, (*unit)?)));
+        let silent: Vec<&Path> = known.iter().filter(|(_, unit)| unit.is_none()).map(|(path, _)| &**path).collect();
+        if let (Some((path, unit)), Some(first)) = (said, silent.first()) {
+            let unit = unit.symbol();
+            let others = if silent.len() > 1 { format!(", nor do {} others", silent.len() - 1) } else { String::new() };
+            let what = format!(
+                "does not say in which unit its lengths are{others}; taken for {unit}, as in {}",
+                path.display()
+            );
+            console.warn(
+                &CliError::in_file(first, what).hint(format!("say what it is in all of them, as --units {unit}")),
+            );
+        }
+    }
+}
+
 /// One of several files as it is now; that it still is that file is checked whenever it is opened.
-fn part(path: &Path) -> Result<(Part, FileIdentity), CliError> {
+fn part(path: &Path, side: &SideLog, units: &Units) -> Result<(Part, FileIdentity), CliError> {
     let wrong = |error: io::Error| CliError::in_file(path, error);
     let file = files::open(path)?;
+    files::expect_raw(path)?;
     let stamp = files::stamp(&file).map_err(wrong)?;
     let identity = FileIdentity::of(path, &file).map_err(wrong)?;
-    let path = path.to_owned();
+    let (path, side, units) = (path.to_owned(), side.clone(), units.clone());
     let name = path.display().to_string();
-    let open: OpenPart = Box::new(move || open_part(&path, stamp));
+    let open: OpenPart = Box::new(move || {
+        let stream = open_part(&path, stamp, &side)?;
+        units.note(&path, stream.unit());
+        Ok(stream)
+    });
     Ok((Part { name, open }, identity))
 }
 
-fn open_part(path: &Path, stamp: Stamp) -> Result<Box<dyn ModelStream>, gigalod_import::ImportError> {
+fn open_part(path: &Path, stamp: Stamp, side: &SideLog) -> Result<Box<dyn ModelStream>, gigalod_import::ImportError> {
     let file = File::open(path)?;
     let watched = file.try_clone()?;
-    open_watched_since(Box::new(file), files::side_files(path), stamp, Box::new(move || files::stamp(&watched)))
+    open_watched_since(Box::new(file), files::side_files(path, side), stamp, Box::new(move || files::stamp(&watched)))
 }
 
 fn is_named_as_model(path: &Path) -> bool {

@@ -55,8 +55,17 @@ pub(crate) fn image_size(text: &str) -> Result<ImageSize, String> {
         width: width.trim().parse().map_err(|_| wrong())?,
         height: height.trim().parse().map_err(|_| wrong())?,
     };
-    if size.width == 0 || size.height == 0 { Err(wrong()) } else { Ok(size) }
+    if size.width == 0 || size.height == 0 {
+        return Err(wrong());
+    }
+    if size.width.max(size.height) > MOST_PIXELS_ACROSS {
+        return Err(format!("'{text}', expected at most {MOST_PIXELS_ACROSS} pixels across"));
+    }
+    Ok(size)
 }
+
+/// What no graphics device goes beyond; most have less, and say so when it comes to drawing.
+const MOST_PIXELS_ACROSS: u32 = 1 << 15;
 
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split(',')
@@ -168,7 +177,7 @@ mod tests {
     #[test]
     fn pictures_have_a_size_and_colours_six_digits() {
         assert_eq!(image_size("640x480"), Ok(ImageSize { width: 640, height: 480 }));
-        assert!(image_size("640").is_err() && image_size("0x4").is_err());
+        assert!(image_size("640").is_err() && image_size("0x4").is_err() && image_size("100000x100000").is_err());
         assert_eq!(color("#ff8000"), Ok([255, 128, 0]));
         assert!(color("#ff80").is_err() && color("#+f8000").is_err());
         assert!(fov("0.001").is_err() && fov("180").is_err() && fov("40") == Ok(40.0));

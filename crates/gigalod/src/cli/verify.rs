@@ -6,14 +6,17 @@ use super::files;
 use super::info::shown;
 use super::inputs::{Inputs, Sense};
 use super::progress::Console;
-use gigalod::verify::{self, Measured, Problems, Sampled};
-use gigalod_build::Progress;
-use gigalod_geom::LengthUnit;
+use gigalod::verify::{self, Measured, Problems, Sampled, SplatTree};
+use gigalod_build::{Progress, SideLog};
+use gigalod_format::{InputCounts, Metadata};
 use gigalod_geom::camera::UpAxis;
+use gigalod_geom::{Aabb, LengthUnit};
 use gigalod_import::{Batch, Material, read_all};
 use gigalod_reference::Mesh;
+use glam::DVec3;
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::Path;
 
 /// The JSON object of `verify`.
 #[derive(Serialize)]
@@ -40,37 +43,33 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
     let work = console.work(&name);
     work.begin("check", splats.skeleton().pages().len() as u64);
     let (tree, mut problems) = verify::check(&splats, &mut |pages| work.at(pages));
-    let mut measured = None;
+    let tell = |problems: &[String]| {
+        for problem in problems {
+            console.warn(&CliError::in_file(&args.file, problem));
+        }
+    };
+    let (mut measured, mut told) = (None, 0);
     if !args.against.is_empty() && problems.count == 0 {
         let originals = Inputs::find(&args.against, console)?;
-        let (model, materials) = read_model(&originals, splats.skeleton().root().up, &work)?;
-        let (origin, leaves) = (splats.skeleton().root().origin, splats.skeleton().root().leaves);
-        let at = |done| work.at(done);
-        let figures = if model.triangles.is_empty() {
-            work.begin("measure", verify::steps_of_points(&tree, &model.vertices));
-            expect_leaves(leaves, model.vertices.positions.len() as u64, "points", &mut problems);
-            verify::against_points(&tree, origin, &model.vertices, &at)
-        } else {
-            let sampled = metadata.dicing.map(|dicing| Sampled::of(dicing.spacing, &model, &materials));
-            let mesh = verify::mesh_of(model).map_err(|error| CliError::in_file(originals.name(), error))?;
-            work.begin("measure", verify::steps(&tree, &mesh));
-            match metadata.dicing {
-                Some(dicing) => expect_samples(leaves, dicing.samples, count_referenced(&mesh), &mut problems),
-                None => expect_leaves(leaves, count_referenced(&mesh), "referenced vertices", &mut problems),
-            }
-            verify::against(&tree, origin, &mesh, sampled.as_ref(), &at)
-        };
-        judge(&figures, &mut problems);
-        measured = Some(figures);
+        let root = splats.skeleton().root();
+        let (model, materials) = read_model(&originals, root.up, &work, console)?;
+        expect_same(&model, &metadata, &root.bounds, &mut problems);
+        // Before what takes long.
+        tell(&problems.told);
+        told = problems.told.len();
+        let splats = (&tree, root.origin);
+        measured = Some(measure(model, &materials, splats, &metadata, originals.name(), &work, &mut problems)?);
     }
     work.finish();
 
-    for problem in &problems.told {
-        console.warn(&CliError::in_file(&args.file, problem));
-    }
+    tell(&problems.told[told..]);
     let ok = problems.count == 0;
     let mut text = String::new();
-    let verdict = if ok { "sound".to_string() } else { format!("{} problems", problems.count) };
+    let verdict = match problems.count {
+        0 => "sound".to_string(),
+        1 => "1 problem".to_string(),
+        count => format!("{count} problems"),
+    };
     let _ = writeln!(text, "{}: {verdict}, {} nodes checked", args.file.display(), tree.nodes.len());
     if let Some(Measured { hausdorff, rms, worst_ratio, violations }) = measured {
         let unit = metadata.options.get("units").map_or("model units".into(), |unit| shown(unit));
@@ -94,6 +93,83 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
     Ok(Outcome { good: ok, ..Outcome::new(&json, text) })
 }
 
+/// Holds the file against the model that it was built from.
+fn measure(
+    model: Batch,
+    materials: &[Material],
+    (tree, origin): (&SplatTree, DVec3),
+    metadata: &Metadata,
+    name: &Path,
+    work: &dyn Progress,
+    problems: &mut Problems,
+) -> Result<Measured, CliError> {
+    if metadata.repeated > tree.twins() {
+        let (repeated, twins) = (metadata.repeated, tree.twins());
+        problems.count += 1;
+        problems.told.push(format!(
+            "{repeated} repeated leaves, expected at most {twins}, as there are nodes with two of a kind"
+        ));
+    }
+    let leaves = metadata.leaves - metadata.repeated.min(metadata.leaves);
+    let at = |done| work.at(done);
+    let figures = if model.triangles.is_empty() {
+        work.begin("measure", verify::steps_of_points(tree, &model.vertices));
+        expect_leaves(leaves, model.vertices.positions.len() as u64, "points", problems);
+        verify::against_points(tree, origin, &model.vertices, &at)
+    } else {
+        let sampled = metadata.dicing.map(|dicing| Sampled::of(dicing.spacing, &model, materials));
+        let mesh = verify::mesh_of(model).map_err(|error| CliError::in_file(name, error))?;
+        work.begin("measure", verify::steps(tree, &mesh, sampled.as_ref()));
+        match metadata.dicing {
+            Some(dicing) => expect_samples(leaves, dicing.samples, count_referenced(&mesh), problems),
+            None => expect_leaves(leaves, count_referenced(&mesh), "referenced vertices", problems),
+        }
+        verify::against(tree, origin, &mesh, sampled.as_ref(), &at)
+    };
+    judge(&figures, problems);
+    Ok(figures)
+}
+
+/// The file says how much was read, and how large that was.
+fn expect_same(model: &Batch, metadata: &Metadata, bounds: &Aabb, problems: &mut Problems) {
+    let [vertices, triangles] = [model.vertices.positions.len(), model.triangles.len()].map(|count| count as u64);
+    let found = match triangles {
+        0 => InputCounts { points: vertices, ..InputCounts::default() },
+        _ => InputCounts { triangles, vertices, points: 0 },
+    };
+    let words = |counts: &InputCounts| match counts {
+        InputCounts { triangles: 0, points, .. } => format!("{points} points"),
+        InputCounts { triangles, vertices, .. } => format!("{triangles} triangles and {vertices} vertices"),
+    };
+    let wrong = if found != metadata.input {
+        Some(format!("{}, it has {}", words(&metadata.input), words(&found)))
+    } else {
+        let around = around(model);
+        let corner = |at: &DVec3| format!("{} {} {}", at.x, at.y, at.z);
+        let box_of = |bounds: &Aabb| format!("{} to {}", corner(&bounds.min), corner(&bounds.max));
+        (around != *bounds).then(|| format!("bounds {}, it has {}", box_of(bounds), box_of(&around)))
+    };
+    if let Some(wrong) = wrong {
+        problems.count += 1;
+        problems.told.push(format!("built from another model than the one that it is held against: expected {wrong}"));
+    }
+}
+
+/// Around all points, or all vertices that triangles use.
+fn around(model: &Batch) -> Aabb {
+    let positions = &model.vertices.positions;
+    let include = |bounds: Aabb, at: DVec3| Aabb { min: bounds.min.min(at), max: bounds.max.max(at) };
+    let nothing = Aabb { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+    match model.triangles.is_empty() {
+        true => positions.iter().fold(nothing, |bounds, at| include(bounds, *at)),
+        false => model
+            .triangles
+            .as_flattened()
+            .iter()
+            .fold(nothing, |bounds, vertex| include(bounds, positions[*vertex as usize])),
+    }
+}
+
 /// Turns figures that no sound file has into problems.
 fn judge(measured: &Measured, problems: &mut Problems) {
     if measured.violations > 0 {
@@ -105,7 +181,7 @@ fn judge(measured: &Measured, problems: &mut Problems) {
     }
 }
 
-/// There is a leaf for each of what the model has.
+/// There is a leaf for each of what the model has, those that repeat others not counted.
 fn expect_leaves(leaves: u64, expected: u64, what: &str, problems: &mut Problems) {
     if leaves != expected {
         problems.count += 1;
@@ -130,8 +206,14 @@ fn count_referenced(mesh: &Mesh) -> u64 {
 }
 
 /// Reads a whole model into memory, with its materials. Which way was up, and in which unit, when it was built is of no matter here.
-fn read_model(originals: &Inputs, up: UpAxis, work: &dyn Progress) -> Result<(Batch, Vec<Material>), CliError> {
-    let (mut stream, _) = originals.open(Sense { up: Some(up), unit: Some(LengthUnit::Metre) })?;
+fn read_model(
+    originals: &Inputs,
+    up: UpAxis,
+    work: &dyn Progress,
+    console: &Console,
+) -> Result<(Batch, Vec<Material>), CliError> {
+    let sense = Sense { up: Some(up), unit: Some(LengthUnit::Metre) };
+    let (mut stream, _) = originals.open(sense, &SideLog::default(), console)?;
     work.begin("read", stream.bytes_consumed().1);
     let all = read_all(&mut *stream, &mut |done, _| work.at(done))
         .map_err(|error| CliError::import(originals.name(), &error))?;

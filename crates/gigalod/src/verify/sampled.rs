@@ -42,37 +42,55 @@ pub(super) fn count_unsampled(
     sampled: &Sampled,
     steps: &Steps<'_>,
 ) -> u64 {
-    let is_masked = |triangle: usize| sampled.masked.get(triangle).copied().unwrap_or(false);
-    mesh.triangles()
-        .par_iter()
-        .enumerate()
-        .filter(|(triangle, _)| {
-            steps.step();
-            !is_masked(*triangle)
-        })
-        .map(|(_, corners)| {
-            let corners = corners.map(|vertex| mesh.positions()[vertex as usize] - origin);
+    asked(mesh, sampled)
+        .map(|corners| {
+            let corners = corners.map(|corner| corner - origin);
             let [a, b, c] = corners;
             let normal = (b - a).cross(c - a).try_normalize();
             let slack = 1e-12 * (a.abs() + b.abs() + c.abs()).max_element();
-            points(corners, sampled.spacing).filter(|point| !has_path(tree, *point, -slack, normal)).count() as u64
+            let is_missed = |point: &DVec3| {
+                steps.step();
+                !has_path(tree, *point, -slack, normal)
+            };
+            points(corners, sampled.spacing).filter(is_missed).count() as u64
         })
         .sum()
 }
 
+/// Number of points that [`count_unsampled`] looks at.
+pub(super) fn count_points(mesh: &Mesh, sampled: &Sampled) -> u64 {
+    let of_triangle = |corners| {
+        let ([ab, bc, ca], within) = counts(&corners, sampled.spacing);
+        u64::from(ab) + u64::from(bc) + u64::from(ca) + u64::from(within)
+    };
+    asked(mesh, sampled).map(of_triangle).sum()
+}
+
+/// Triangles that are to be covered everywhere.
+fn asked(mesh: &Mesh, sampled: &Sampled) -> impl ParallelIterator<Item = [DVec3; 3]> {
+    let is_masked = |triangle: usize| sampled.masked.get(triangle).copied().unwrap_or(false);
+    let all = mesh.triangles().par_iter().enumerate().filter(move |(triangle, _)| !is_masked(*triangle));
+    all.map(|(_, corners)| corners.map(|vertex| mesh.positions()[vertex as usize]))
+}
+
+/// How many points there are along each edge, and within.
+fn counts([a, b, c]: &[DVec3; 3], spacing: f64) -> ([u32; 3], u32) {
+    let edge = |from: &DVec3, to: &DVec3| (from.distance(*to) / spacing).ceil().clamp(1.0, MOST_EDGE_POINTS) as u32;
+    let area = (*b - *a).cross(*c - *a).length() * 0.5;
+    ([edge(a, b), edge(b, c), edge(c, a)], (area / spacing / spacing).ceil().clamp(4.0, MOST_POINTS) as u32)
+}
+
 /// Points of a triangle: along its edges, and within.
 fn points([a, b, c]: [DVec3; 3], spacing: f64) -> impl Iterator<Item = DVec3> {
-    let edge = move |from: DVec3, to: DVec3| {
-        let count = (from.distance(to) / spacing).ceil().clamp(1.0, MOST_EDGE_POINTS) as u32;
+    let ([ab, bc, ca], count) = counts(&[a, b, c], spacing);
+    let edge = move |from: DVec3, to: DVec3, count: u32| {
         (0..count).map(move |at| from + (to - from) * (f64::from(at) / f64::from(count)))
     };
-    let area = (b - a).cross(c - a).length() * 0.5;
-    let count = (area / spacing / spacing).ceil().clamp(4.0, MOST_POINTS) as u32;
     // Of low discrepancy: multiples of the inverses of the plastic number and its square (Roberts 2018).
     let within = (0..count).map(move |at| {
         let [u, v] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3].map(|step| (f64::from(at) + 0.5) * step % 1.0);
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         a + (b - a) * u + (c - a) * v
     });
-    edge(a, b).chain(edge(b, c)).chain(edge(c, a)).chain(within)
+    edge(a, b, ab).chain(edge(b, c, bc)).chain(edge(c, a, ca)).chain(within)
 }

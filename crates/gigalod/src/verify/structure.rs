@@ -31,6 +31,21 @@ pub struct SplatTree {
     pub nodes: Vec<TreeNode>,
 }
 
+impl SplatTree {
+    /// Nodes with two children that are alike. A leaf that is repeated, so that it is not drawn too large, is one of them.
+    pub fn twins(&self) -> u64 {
+        let looks = |it: &TreeNode| (it.node.sphere(), it.node.normal(), it.node.cone(), it.color);
+        let is_twins = |parent: &&TreeNode| {
+            let children = parent.first_child as usize..parent.first_child as usize + usize::from(parent.children);
+            match &self.nodes[children] {
+                [one, other] => looks(one) == looks(other),
+                _ => false,
+            }
+        };
+        self.nodes.iter().filter(is_twins).count() as u64
+    }
+}
+
 /// A family that some group points to: its groups' parents, by their index in the tree.
 type Parents = [Option<u32>; 4];
 

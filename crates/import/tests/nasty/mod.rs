@@ -114,8 +114,10 @@ pub(crate) const OTHERS: &[(&str, Outcome)] = &[
     ),
     (
         "validator_invalid_magic.glb",
-        Err("expected a model in a known format (PLY, glTF, LAS, E57, PCD, OFF, STL, OBJ, XYZ; plain or in gzip), \
-             found a file that starts with `\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00`"),
+        Err(
+            "expected a model in a known format (PLY, glTF, LAS, E57, PCD, OFF, STL, OBJ, XYZ or PTS; plain or in gzip), \
+             found a file that starts with `\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00\\x00`",
+        ),
     ),
     ("validator_invalid_uri_data.glb", Err("expected data in base64, found no comma after `data:` (byte 0, buffer 0)")),
     ("validator_length_mismatch.glb", Err("the file ends before its 49 bytes of GLB are complete (byte 48)")),

@@ -36,7 +36,7 @@ fn binary(index: &str, vertices: [[f32; 3]; 2], face: &[u8]) -> Vec<u8> {
 #[test]
 fn files_that_are_no_models_are_refused() {
     assert_eq!(error(b""), "expected a model, found an empty file");
-    let known = "expected a model in a known format (PLY, glTF, LAS, E57, PCD, OFF, STL, OBJ, XYZ; plain or in gzip), \
+    let known = "expected a model in a known format (PLY, glTF, LAS, E57, PCD, OFF, STL, OBJ, XYZ or PTS; plain or in gzip), \
         found a file that starts with";
     assert_eq!(error(b"\x89PNG\r\n\x1a\n\0\0"), format!("{known} `\\x89PNG\\r\\n\\x1a\\n\\x00\\x00`"));
     assert_eq!(error(b"plywood is no mesh, however thin"), format!("{known} `plywood is no me`"));

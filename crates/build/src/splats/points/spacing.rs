@@ -8,6 +8,10 @@
 //! At the border of a surface, and around points that belong to none, there are triangles that no gap between samples explains.
 //! Those larger than [`FAR`] times the spacing of the nearest neighbours *among each other* do not count. That spacing does
 //! not know how far away they are, so an isolated point is as small as what it is nearest to.
+//!
+//! A triangle that is larger than that spacing shows a surface only where what is around lies in a plane, as between scan lines.
+//! Around a lamp post, or in a tree, it does not: there each point only meets its nearest neighbours halfway. The few points of a lamp,
+//! with a gap around and the next ones all on one side, are no larger than the lamp.
 
 use super::nearest::{larger, smaller};
 use glam::Vec3;
@@ -18,6 +22,16 @@ const FAR: f32 = 4.0;
 
 /// Neighbours whose distances among each other make the spacing.
 const AMONG: usize = 8;
+
+/// What is around lies in a plane if it is off by no more than this, in the mean, of the size that it would give.
+const FLAT: f32 = 0.2;
+/// Balls that are larger than so many spacings must show that.
+const BEYOND: f32 = 2.0;
+
+/// And it is a plane rather than a line if it is at least so wide, in the mean.
+const WIDE: f32 = 0.3;
+/// So many points are not on a line by chance.
+const MANY: usize = 8;
 
 /// A point's size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +58,8 @@ pub(super) fn size(differences: &[Vec3], squares: &[f32], normal: Vec3, is_all: 
     let Some(farthest) = squares.last().map(|square| square.sqrt()) else {
         return Size { radius: 0.0, is_open: false };
     };
-    let far = FAR * spacing(differences, squares);
+    let spacing = spacing(differences, squares);
+    let far = FAR * spacing;
     let (u, v) = normal.any_orthonormal_pair();
     let frame = 2.0 * far;
     let mut corners = Cell::new(frame);
@@ -78,10 +93,52 @@ pub(super) fn size(differences: &[Vec3], squares: &[f32], normal: Vec3, is_all: 
             radius = larger(radius, if halfway <= far { halfway } else { 0.0 });
         }
     }
+    // Up to twice the spacing a sharp edge may look like a tree, and has no hole.
+    if radius > BEYOND * spacing && !is_flat(differences, squares, normal, radius) {
+        radius = 0.0;
+    }
     // Where the plane is wrong, as on a thin ridge, neighbours are still met.
     let fourth = squares[squares.len().min(4) - 1].sqrt() * 0.5;
-    radius = larger(radius, smaller(fourth, far / FAR));
+    radius = larger(radius, smaller(fourth, spacing));
+    if let Some(cluster) = lone_cluster(differences, squares, normal) {
+        radius = smaller(radius, cluster);
+    }
     Size { radius, is_open: !is_all && farthest < 2.0 * farthest_corner }
+}
+
+/// Gaps are so many times as wide as what they are around.
+const GAP: f32 = 3.0;
+
+/// How far the mean of directions is from the centre where all are on one side: at a straight border it is 0.64.
+const ONE_SIDE: f32 = 0.8;
+
+/// Points of a lone cluster at most; and as many of those beyond the gap are asked where they are.
+const CLUSTER: usize = 8;
+
+/// How far the others of a few points are that are far from everything else, if the point is one of such.
+fn lone_cluster(differences: &[Vec3], squares: &[f32], normal: Vec3) -> Option<f32> {
+    let is_gap = |at: &usize| squares[*at] > squares[*at - 1] * (GAP * GAP);
+    // The widest of what is near.
+    let inside = (1..squares.len().min(CLUSTER)).rev().find(is_gap)?;
+    let beyond = &differences[inside..differences.len().min(inside + CLUSTER)];
+    let mean: Vec3 = beyond.iter().map(|difference| difference.normalize_or_zero()).sum::<Vec3>() / beyond.len() as f32;
+    let is_lone = mean.length() > ONE_SIDE && !is_flat(differences, squares, normal, squares[inside].sqrt());
+    is_lone.then(|| squares[inside - 1].sqrt())
+}
+
+/// True where neighbours that touch a ball of this size fill the plane across `normal`.
+fn is_flat(differences: &[Vec3], squares: &[f32], normal: Vec3, radius: f32) -> bool {
+    let near = squares.iter().take_while(|square| **square <= 4.0 * radius * radius).count();
+    let (u, v) = normal.any_orthonormal_pair();
+    let [mut off, mut uu, mut uv, mut vv] = [0.0_f32; 4];
+    for difference in &differences[..near] {
+        let (x, y, z) = (difference.dot(u), difference.dot(v), difference.dot(normal));
+        (off, uu, uv, vv) = (off + z * z, uu + x * x, uv + x * y, vv + y * y);
+    }
+    // The lesser eigenvalue: how wide it is across the direction in which it is widest.
+    let across = (uu + vv) * 0.5 - ((uu - vv) * (uu - vv) * 0.25 + uv * uv).sqrt();
+    let unit = radius * radius * near as f32;
+    off <= FLAT * FLAT * unit && (near < MANY || across >= WIDE * WIDE * unit)
 }
 
 /// Radius of the bounding sphere of the triangle that a point makes with two neighbours: half its longest edge where the angle
@@ -189,12 +246,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn sized(mut others: Vec<Vec3>, most: usize) -> Size {
+    fn sized(others: Vec<Vec3>, most: usize) -> Size {
+        sized_across(others, most, Vec3::Z)
+    }
+
+    fn sized_across(mut others: Vec<Vec3>, most: usize, normal: Vec3) -> Size {
         others.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         let is_all = others.len() <= most;
         others.truncate(most);
         let squares: Vec<f32> = others.iter().map(|d| d.length_squared()).collect();
-        size(&others, &squares, Vec3::Z, is_all)
+        size(&others, &squares, normal, is_all)
     }
 
     fn grid(reach: i32, of: impl Fn(f32, f32) -> Vec3) -> Vec<Vec3> {
@@ -226,6 +287,54 @@ mod tests {
         }
         assert_eq!(sized(vec![], 16).radius, 0.0);
         assert_eq!(sized(vec![Vec3::X], 16).radius, 0.5);
+    }
+
+    /// Few points above one another, over a ground that is sampled more densely, and a tree.
+    #[test]
+    fn points_that_show_no_surface_only_meet_their_nearest_neighbours() {
+        let ground = |height: f32| grid(9, move |x, y| Vec3::new(x, y, -height));
+        for (height, apart) in [(6.0, 3.0), (9.0, 4.0), (20.0, 6.0)] {
+            let mut around = ground(height);
+            around.push(Vec3::new(0.1, 0.0, apart));
+            around.extend(
+                (1..).map(|at| at as f32 * apart).take_while(|at| *at < height).map(|at| Vec3::new(0.0, 0.1, -at)),
+            );
+            // A lamp post has no plane: any normal may come of it.
+            for normal in [Vec3::Z, Vec3::X, Vec3::new(0.6, 0.0, 0.8)] {
+                let size = sized_across(around.clone(), 16, normal);
+                assert!(size.radius <= apart * 1.5, "{height} {apart} {normal}: {size:?}");
+            }
+        }
+        let mut state = 3u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1 << 24) as f32 - 0.5
+        };
+        for _ in 0..200 {
+            // One for each unit of volume: the nearest is 0.55 away in the mean.
+            let tree: Vec<Vec3> = (0..512).map(|_| Vec3::new(random(), random(), random()) * 8.0).collect();
+            let size = sized(tree, 16);
+            assert!(size.radius <= 2.0, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn a_lamp_is_no_larger_than_its_points_are_apart_and_pairs_on_a_surface_are_no_lamp() {
+        let lamp = [Vec3::new(0.5, 0.0, 0.1), Vec3::new(0.2, 0.6, 0.0), Vec3::new(-0.3, 0.2, -0.2)];
+        for height in [3.0, 10.0, 40.0] {
+            let mut around = grid(9, |x, y| Vec3::new(x, y, -height));
+            around.extend(lamp);
+            for normal in [Vec3::Z, Vec3::X] {
+                let size = sized_across(around.clone(), 16, normal);
+                assert!(size.radius <= 0.7, "{height} {normal}: {size:?}");
+            }
+        }
+        // Points that all but coincide, as two registered scans have them.
+        let mut pairs = grid(4, |x, y| Vec3::new(x, y, 0.0));
+        pairs.extend(grid(4, |x, y| Vec3::new(x, y + 0.01, 0.0)));
+        pairs.push(Vec3::new(0.0, 0.01, 0.0));
+        let size = sized(pairs, 64);
+        assert!(size.radius >= 0.7, "{size:?}");
     }
 
     proptest! {
