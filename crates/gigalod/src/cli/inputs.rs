@@ -104,7 +104,10 @@ impl Inputs {
 
 /// What files say a length of 1 is, in the order in which they were opened.
 #[derive(Clone, Default)]
-struct Units(Arc<Mutex<Vec<(PathBuf, Option<LengthUnit>)>>>);
+struct Units(Arc<Mutex<Vec<Said>>>);
+
+/// A file, and the unit that it names.
+type Said = (PathBuf, Option<LengthUnit>);
 
 impl Units {
     fn note(&self, path: &Path, unit: Option<LengthUnit>) {
