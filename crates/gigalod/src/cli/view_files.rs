@@ -99,6 +99,9 @@ impl Files {
                 (cached, Some(path.to_owned()))
             }
         };
+        if original.is_some() {
+            cache::note_place(path, &container);
+        }
         let file = Arc::new(files::open_splats(&container)?);
         Ok(Model { source: path.to_owned(), file, original, placements })
     }

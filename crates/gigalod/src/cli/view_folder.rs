@@ -2,7 +2,6 @@
 
 use super::cache;
 use super::error::CliError;
-use super::files;
 use gigalod_view::{Entry, Folder, Kind};
 use std::path::{Path, PathBuf};
 
@@ -31,8 +30,7 @@ fn entry_of(path: PathBuf) -> Option<Entry> {
         return Some(Entry { path, kind: Kind::Folder, bytes: 0 });
     }
     let kind = kind_of(&name).filter(|_| metadata.is_file())?;
-    let was_built = || files::open(&path).is_ok_and(|file| cache::was_built(&path, &file));
-    let kind = if kind == Kind::Raw && was_built() { Kind::Built } else { kind };
+    let kind = if kind == Kind::Raw && cache::was_built(&path) { Kind::Built } else { kind };
     Some(Entry { path, kind, bytes: metadata.len() })
 }
 

@@ -4,7 +4,7 @@
 //! and, once the cut is made, how large its pixels are drawn.
 //!
 //! Source: the splats paper, section 2.1, adjusts the threshold by the ratio of actual to desired time. That feedback is kept,
-//! with three changes. It acts through a cost model that is learned on the way ([`cost`]), because the time of a frame has parts that
+//! with three changes. It acts through a cost model that is learned on the way (`cost`), because the time of a frame has parts that
 //! no threshold changes. The number of splats that the target affords also bounds the next cut, so that a sudden turn towards
 //! detail makes a coarse frame and not a late one (Funkhouser and Séquin's prediction, in one number). And larger splats cover as
 //! many pixels as the small ones that they stand for: where pixels are what takes the time, they are drawn larger
