@@ -131,7 +131,7 @@ fn what_cannot_be_done_ends_with_status_1_and_one_line() {
 
     let out = path("a.glod");
     run!["build", missing, "-o", out, "--json"].failed(&missing);
-    assert!(run!["info", folder.path(), "--json"].failed(folder.path()).contains("not a regular file"));
+    assert!(run!["info", folder.path(), "--json"].failed(folder.path()).contains("a folder, expected a file"));
     run!["build", broken, "-o", out, "--json"].failed(&broken);
     let ran = run!["build", cut, "-o", out, "--json"];
     ran.failed(&cut);

@@ -106,7 +106,7 @@ impl Inputs {
 #[derive(Clone, Default)]
 struct Units(Arc<Mutex<Vec<Said>>>);
 
-/// A file, and the unit that it names.
+/// A file, and what it says.
 type Said = (PathBuf, Option<LengthUnit>);
 
 impl Units {
