@@ -29,6 +29,16 @@ impl ImageSize {
 /// Default vertical field of view, in degrees.
 pub const DEFAULT_FOV_DEG: f64 = 40.0;
 
+/// Where a model is looked at from unless somebody says otherwise: azimuth and elevation in degrees, for [`Camera::orbit`]. From the
+/// front; what lies flat, as terrain does, obliquely from above, since from the front there is only its edge.
+pub fn default_orbit_deg(bounds: &Aabb, up: UpAxis) -> [f64; 2] {
+    /// Flat is at most so high, in shortest sides of the ground.
+    const FLAT: f64 = 0.3;
+    let sides = (up.frame().transpose() * bounds.extent()).abs();
+    let ground = sides.x.min(sides.z);
+    [0.0, if ground > 0.0 && sides.y <= FLAT * ground { 35.0 } else { 0.0 }]
+}
+
 /// A pinhole camera; world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -196,6 +206,16 @@ mod tests {
         assert!(above.eye.y > 1.0 && (above.up - DVec3::NEG_Z).length() < 1e-9);
         let z_up = Camera::orbit(&bounds, UpAxis::Z, [0.0, 0.0], 1.0, 0.7, SIZE);
         assert!((z_up.forward - DVec3::Y).length() < 1e-12 && (z_up.up - DVec3::Z).length() < 1e-12);
+    }
+
+    #[test]
+    fn what_lies_flat_is_seen_from_above_and_all_else_from_the_front() {
+        let look = |x, y, z, up| default_orbit_deg(&Aabb { min: DVec3::ZERO, max: DVec3::new(x, y, z) }, up)[1];
+        assert!(look(600.0, 500.0, 40.0, UpAxis::Z) >= 30.0, "terrain");
+        assert_eq!(look(600.0, 500.0, 40.0, UpAxis::Y), 0.0, "a relief on a wall");
+        assert_eq!(look(100.0, 5.0, 4.0, UpAxis::Y), 0.0, "a train is long, not flat");
+        assert_eq!(look(2.0, 1.5, 1.0, UpAxis::Z), 0.0, "a statue");
+        assert_eq!(look(0.0, 0.0, 0.0, UpAxis::Y), 0.0, "a point");
     }
 
     #[test]

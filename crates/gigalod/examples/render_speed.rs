@@ -5,7 +5,8 @@
 //!
 //! Takes a built model; prints one JSON object on a line: for each way CPU-seconds (user and system, of the whole process) of
 //! the median frame, sent and drawn, and drawn only (the list already lies on the device), and points per CPU-second of both,
-//! less what a frame of that size costs with a single splat: what is paid for each pixel and not for each point.
+//! less what a frame of that size costs with a single splat: what is paid for each pixel and not for each point; and how many pixels
+//! a point covers, which is more than one where the data are coarser.
 //!
 //! Ways: `compute`: as the renderer does. `quads`: the same with every splat through the pipeline (extent 0). `depth_test`: the
 //! pipeline with a depth test, as on devices without storage buffers. `one`: a frame of one splat.
@@ -109,6 +110,7 @@ fn main() -> Result<()> {
     let adapter = native.gpu().adapter();
     let report = json!({
         "file": file, "adapter": adapter, "wide_keys": native.gpu().has_wide_keys(), "points": points,
+        "pixels_per_point": scene.area_px(ViewId(0), &camera) / points,
         "threshold_px": options.threshold_px, "kernel": format!("{:?}", options.kernel), "ways": ways,
     });
     println!("{report}");

@@ -56,8 +56,7 @@ fn bench_reports_exactly_the_keys_of_the_contract() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("turn.json");
     run!["synth", "path", "sudden-turn", "--around", statue().glod, "-o", path, "--seconds", "0.5"].done();
-    const FRAMES: &str =
-        "frames[{frame_ms max_error_px page_misses points select_ms t threshold_px triangles upload_bytes}]";
+    const FRAMES: &str = "frames[{frame_ms max_error_px moved page_misses pixel_edge_px points select_ms t threshold_px triangles upload_bytes}]";
     let ran = run!["bench", statue().glod, "--path", path, "--size", "64x36", "--json"].done();
     let json = ran.json();
     assert_eq!(

@@ -1,5 +1,5 @@
-//! What of the graphics device is used, by environment: the picture is the same at every level, and on every
-//! interface but for rounding.
+//! What of the graphics device is used, by environment: the picture is the same at every level, and through
+//! every interface.
 
 mod cli_support;
 
@@ -23,14 +23,6 @@ fn draw(folder: &Path, model: &Path, kernel: &str, environment: &[(&str, &str)])
     Some((std::fs::read(png).unwrap(), std::fs::read(exr).unwrap()))
 }
 
-/// The bytes of a picture.
-fn pixels(png: &[u8]) -> Vec<u8> {
-    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
-    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-    reader.next_frame(&mut bytes).unwrap();
-    bytes
-}
-
 fn statue(folder: &Path) -> PathBuf {
     let (ply, glod) = (folder.join("statue.ply"), folder.join("statue.glod"));
     let mut synth = command();
@@ -48,19 +40,10 @@ fn vulkan_opengl_and_the_baseline_show_the_same() {
     let model = statue(folder.path());
     for kernel in ["square", "round", "gauss", "square-ellipse", "round-ellipse", "gauss-ellipse"] {
         let Some(expected) = draw(folder.path(), &model, kernel, &[]) else { return };
-        for environment in [[("WGPU_BACKEND", "vulkan")], [("GIGALOD_GPU_LEVEL", "webgpu")]] {
-            if let Some(drawn) = draw(folder.path(), &model, kernel, &environment) {
-                assert!(drawn == expected, "{kernel}, {environment:?}");
+        for environment in [[("WGPU_BACKEND", "vulkan")], [("WGPU_BACKEND", "gl")], [("GIGALOD_GPU_LEVEL", "webgpu")]] {
+            if let Some((picture, depth)) = draw(folder.path(), &model, kernel, &environment) {
+                assert!(picture == expected.0 && depth == expected.1, "{kernel}, {environment:?}");
             }
-        }
-        // Another compiler of shaders, which rounds a few products in another way: a step of 255 in one pixel of a thousand.
-        if let Some(drawn) = draw(folder.path(), &model, kernel, &[("WGPU_BACKEND", "gl")]) {
-            let [drawn, expected] = [&drawn.0, &expected.0].map(|png| pixels(png));
-            let apart: Vec<u8> = std::iter::zip(&drawn, &expected).map(|(a, b)| a.abs_diff(*b)).collect();
-            let others = apart.iter().filter(|apart| **apart > 0).count();
-            println!("{kernel}: {others} of {} values differ through OpenGL", apart.len());
-            assert!(drawn.len() == expected.len() && apart.iter().all(|apart| *apart <= 1), "{kernel}");
-            assert!(others * 1000 <= apart.len(), "{kernel}: {others} of {}", apart.len());
         }
     }
 }

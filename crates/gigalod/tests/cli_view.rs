@@ -84,6 +84,12 @@ impl Screen {
     }
 }
 
+impl Screen {
+    fn pixel(&self, [x, y]: [i32; 2]) -> [u8; 3] {
+        self.pixels()[y as usize * WIDTH + x as usize]
+    }
+}
+
 impl Drop for Screen {
     fn drop(&mut self) {
         let _ = self.server.kill();
@@ -124,8 +130,10 @@ impl Viewing<'_> {
         self.hand(&["sleep", "0.3", "mouseup", button]);
     }
 
+    /// Clicks, and takes the cursor out of the way.
     fn clicks(&self, [x, y]: [i32; 2]) {
-        self.hand(&["mousemove", &x.to_string(), &y.to_string(), "sleep", "0.1", "click", "1"]);
+        let (x, y) = (x.to_string(), y.to_string());
+        self.hand(&["mousemove", &x, &y, "sleep", "0.1", "click", "1", "sleep", "0.1", "mousemove", "20", "560"]);
     }
 
     /// Takes a picture, which is there when nothing gets finer any more.
@@ -171,6 +179,14 @@ fn waits_until(is_so: impl Fn() -> bool) {
         assert!(begun.elapsed() < Duration::from_secs(120), "it never came to be so");
         std::thread::sleep(Duration::from_millis(20));
     }
+}
+
+fn is_orange([red, green, blue]: [u8; 3]) -> bool {
+    red > 200 && (140..200).contains(&green) && blue < 100
+}
+
+fn is_green([red, green, blue]: [u8; 3]) -> bool {
+    red < 160 && green > 200 && blue < 160
 }
 
 fn read_png(path: &Path) -> (usize, Vec<[u8; 3]>) {
@@ -227,9 +243,14 @@ fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
     viewing.presses("m");
     // Left of the panel.
     let clicked = [[270, 200], [320, 420]];
-    clicked.iter().for_each(|at| viewing.clicks(*at));
-    // The original is read in the background, and nothing in the window can be waited for from here.
-    std::thread::sleep(Duration::from_secs(8));
+    for [x, y] in clicked {
+        viewing.clicks([x, y]);
+        waits_until(|| is_orange(screen.pixel([x, y])) || is_green(screen.pixel([x, y])));
+    }
+    // Orange until the original was read, then green.
+    for [x, y] in clicked {
+        waits_until(|| is_green(screen.pixel([x, y])));
+    }
     let figures = viewing.closes();
     let measured = &figures["measured"];
     assert_eq!(measured["uncertain"], 0.0, "{figures}");
@@ -255,6 +276,36 @@ fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
         let error = (vector(point) - (camera.eye + direction * truth.t)).length() / mesh.bounds().diagonal();
         assert!(error < 1e-6, "{error} of the diagonal");
     }
+}
+
+#[test]
+fn a_window_survives_what_happens_to_it() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    let viewing = screen.view(place.path(), [&statue().glod]);
+    let window = |does: &[&str]| viewing.hand(&[&["search", "--name", "^Gigalod$"], does].concat());
+    viewing.presses("F2");
+    let (_, first) = read_png(&viewing.takes_picture("statue-1.png"));
+    // The device is lost, and with it all that lay there.
+    viewing.presses("F5");
+    let (_, second) = read_png(&viewing.takes_picture("statue-2.png"));
+    assert!(first == second, "another device draws the same");
+    waits_until(|| screen.pixels() == second);
+    window(&["windowunmap", "--sync"]);
+    window(&["windowmap", "--sync", "windowfocus", "--sync"]);
+    waits_until(|| screen.pixels() == second);
+    window(&["windowsize", "--sync", "640", "400"]);
+    let (width, smaller) = read_png(&viewing.takes_picture("statue-3.png"));
+    assert_eq!((width, smaller.len()), (640, 640 * 400));
+    let corner = || {
+        let pixels = screen.pixels();
+        (0..400).all(|y| pixels[y * WIDTH..][..640] == smaller[y * 640..][..640])
+    };
+    waits_until(corner);
+    let figures = viewing.closes();
+    let problems = figures["problems"].as_array().unwrap();
+    let is_told = problems.len() == 1 && problems[0].as_str().unwrap().contains("lost and opened anew");
+    assert!(is_told, "{problems:?}");
 }
 
 #[test]

@@ -140,6 +140,54 @@ fn small_or_large_in_one_phase_or_two_splats_show_the_same() {
     }
 }
 
+/// Hundreds of splats over each pixel, many of them equally near, so that a few are drawn before the others where that pays.
+#[test]
+fn many_splats_over_each_other_show_the_nearest_whichever_are_drawn_first() {
+    let Some(mut native) = renderer() else { return };
+    let mut baseline = Renderer::new(Gpu::open_at(GpuLevel::WebGpu).unwrap()).unwrap();
+    let mut state = 1u64;
+    let mut random = |most: u32| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as u32 % most
+    };
+    // A grid, so that there are splats in one and the same place, of another colour.
+    let splats: Vec<_> = (0..40_000)
+        .map(|_| {
+            let [x, y, z] = [random(80), random(80), random(4)].map(|at| at as f32);
+            let center_in_eye = [x * 0.0125 - 0.5, y * 0.0125 - 0.5, -1.0 - z * 0.05];
+            (SplatBall { center_in_eye, radius: 0.02 + random(3) as f32 * 0.01 }, Vec3::Z, random(0x1_0000))
+        })
+        .collect();
+    let source = list(splats.iter().copied());
+    let draws = [(Similarity::IDENTITY, &source)];
+    let camera = small_camera();
+    for kernel in Kernel::ALL.into_iter().filter(|kernel| !kernel.is_gauss()) {
+        let shown = picture(&mut native, &camera, kernel, &draws);
+        let expected = picture(&mut baseline, &camera, kernel, &draws);
+        assert!(same(&shown, &expected), "{kernel:?}: with keys of 32 bits");
+        // What the first rounds found is forgotten with the next frame.
+        let few = list(splats[..2000].iter().copied());
+        let few = [(Similarity::IDENTITY, &few)];
+        let [shown, expected] = [&mut native, &mut baseline].map(|renderer| picture(renderer, &camera, kernel, &few));
+        assert!(same(&shown, &expected), "{kernel:?}: fewer");
+    }
+    // By what it is: the nearest front of all balls whose silhouette covers the middle of a pixel, the first of equals.
+    let shown = picture(&mut native, &camera, Kernel::Round, &draws);
+    for pixel in [[100, 100], [37, 141], [3, 7]] {
+        let ray = camera.ray_through(glam::DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5);
+        let depths = splats.iter().filter_map(|(ball, ..)| {
+            let (center, radius) = (Vec3::from(ball.center_in_eye).as_dvec3(), f64::from(ball.radius));
+            let along = ray.dot(center) / ray.length_squared();
+            let apart = (center - ray * along).length_squared();
+            (apart <= radius * radius).then(|| along - ((radius * radius - apart) / ray.length_squared()).sqrt())
+        });
+        let nearest = depths.fold(f64::INFINITY, f64::min);
+        let drawn = f64::from(shown.depth[pixel[1] as usize * 200 + pixel[0] as usize]);
+        // A splat is drawn a hundredth of a pixel larger than its ball, and there it has the depth of the ball's middle.
+        assert!((drawn / nearest - 1.0).abs() < 1e-3, "{pixel:?}: {drawn} {nearest}");
+    }
+}
+
 /// Of several instances each pixel shows the nearest: what drawing them one by one and comparing depths shows.
 #[test]
 fn turned_instances_and_lists_of_many_buffers_hide_each_other() {

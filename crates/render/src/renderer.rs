@@ -12,11 +12,12 @@ use crate::splats::Kernel;
 use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
 use crate::splats::keyed::{self, Bands, KeyedBuffers, KeyedFrame, KeyedPass};
 use crate::splats::params::STRIDE;
+use crate::splats::pipelines::{Resolving, Round};
 use crate::splats::store::{self, Chunk, Plan};
 use crate::staging::Staging;
 use crate::{Gpu, GpuLevel, Lighting, RenderError};
 use gigalod_geom::{Camera, ImageSize};
-use gigalod_runtime::{DrawSource, Similarity, SplatList};
+use gigalod_runtime::{DrawSource, ModelView, Similarity, SplatList};
 
 /// How things are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,6 +72,8 @@ pub struct Renderer {
 #[derive(Debug)]
 struct OnDevice {
     kernel: Kernel,
+    rounds: &'static [Round],
+    resolving: Resolving,
     bands: Bands,
     plan: Plan,
 }
@@ -298,23 +301,27 @@ impl Renderer {
         staging.write(gpu, buffers.light.buffer(), 0, bytemuck::bytes_of(&light))?;
         staging.finish(gpu)?;
         *uploaded_bytes = staging.take_written_bytes();
-        self.last = Some(OnDevice { kernel, bands, plan });
+        let area_px = lists.iter().map(|(placement, list)| list.area_px(&ModelView::new(camera, placement))).sum();
+        let rounds = keyed::rounds(gpu, camera.size, kernel, area_px);
+        let resolving = Resolving { many_parts: plan.has_many_parts(), footprint: read_back };
+        self.last = Some(OnDevice { kernel, rounds, resolving, bands, plan });
         Ok(())
     }
 
     /// Hands what lies on the device to the device.
     fn submit_last(&mut self) -> Result<(), RenderError> {
         let Self { gpu, buffers, targets, .. } = self;
-        let OnDevice { kernel, bands, plan } = self.last.as_ref().expect("just sent, or asked for");
+        let OnDevice { kernel, rounds, resolving, bands, plan } = self.last.as_ref().expect("just sent, or asked for");
         let Targets { gbuffer, picture } = targets.as_ref().expect("made with the room");
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let chunks = &buffers.chunks[..plan.chunks.len()];
-        let (kernel, passes, parts) = (*kernel, &buffers.passes, &buffers.parts);
+        let (kernel, resolving, passes, parts) = (*kernel, *resolving, &buffers.passes, &buffers.parts);
         if chunks.is_empty() {
             drop(gbuffer.begin(&mut encoder, true));
         } else if gpu.level() > GpuLevel::WebGl {
-            self.keyed_pass.prepare(gpu, kernel, plan);
-            let keyed = KeyedFrame { kernel, bands: *bands, plan, chunks, passes, parts, buffers: &buffers.keyed };
+            self.keyed_pass.prepare(gpu, kernel, resolving);
+            let (bands, buffers) = (*bands, &buffers.keyed);
+            let keyed = KeyedFrame { kernel, rounds, resolving, bands, plan, chunks, passes, parts, buffers };
             self.keyed_pass.encode(gpu, &mut encoder, gbuffer, &keyed);
         } else {
             self.depth_test_pass.prepare(gpu, kernel);

@@ -2,10 +2,12 @@
 //! stands for one of several files: where a pass delivers what it draws.
 
 /// Sources that others import, by name.
-const SHARED: [(&str, &str); 10] = [
+const SHARED: [(&str, &str); 12] = [
+    ("dot.wgsl", include_str!("shader/dot.wgsl")),
     ("light_params.wgsl", include_str!("shader/light_params.wgsl")),
     ("splat_keys_32.wgsl", include_str!("shader/splat_keys_32.wgsl")),
     ("splat_keys_64.wgsl", include_str!("shader/splat_keys_64.wgsl")),
+    ("splat_keys_64_found.wgsl", include_str!("shader/splat_keys_64_found.wgsl")),
     ("splat_nearness.wgsl", include_str!("shader/splat_nearness.wgsl")),
     ("splat_params.wgsl", include_str!("shader/splat_params.wgsl")),
     ("splat_parts.wgsl", include_str!("shader/splat_parts.wgsl")),
@@ -22,6 +24,8 @@ pub(crate) enum Target {
     None,
     /// Keys of 64 bits.
     Keys64,
+    /// Keys of 64 bits, of which some have been found before.
+    Keys64Found,
     /// Keys of two words.
     Keys32,
     /// Sums.
@@ -33,6 +37,7 @@ impl Target {
         match self {
             Self::None => "",
             Self::Keys64 => "splat_keys_64.wgsl",
+            Self::Keys64Found => "splat_keys_64_found.wgsl",
             Self::Keys32 => "splat_keys_32.wgsl",
             Self::Sums => "splat_sums.wgsl",
         }
@@ -101,7 +106,7 @@ pub(crate) mod tests {
         let baseline = Capabilities::empty();
         let light = [("light", crate::light::SOURCE, Target::None, baseline)];
         let splats = crate::splats::sources().map(|(name, source, target)| {
-            (name, source, target, if target == Target::Keys64 { wide } else { baseline })
+            (name, source, target, if matches!(target, Target::Keys64 | Target::Keys64Found) { wide } else { baseline })
         });
         for (name, source, target, capabilities) in light.into_iter().chain(splats) {
             let text = resolve(source, target);

@@ -12,6 +12,7 @@
 
 pub mod controller;
 pub mod fineness;
+pub mod magnified;
 pub mod report;
 pub mod residency;
 pub mod scene;
@@ -21,6 +22,7 @@ pub mod view;
 
 pub use controller::FrameRate;
 pub use fineness::{Fineness, Interrupt};
+pub use magnified::Magnified;
 pub use report::{CutReport, Limit};
 pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};
 pub use scene::{Instance, Scene};

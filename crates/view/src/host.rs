@@ -10,6 +10,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 /// A model open for drawing.
 #[derive(Clone)]
@@ -37,10 +38,47 @@ pub enum Opened {
     Model(Model),
     /// To take the place of what is shown.
     Scene(OpenedScene),
-    /// Something to choose from, in order.
-    Folder(Vec<PathBuf>),
+    /// Something to choose from.
+    Folder(Folder),
     /// To be played.
     Path(CameraPath),
+}
+
+/// What can be opened in a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folder {
+    /// Its absolute name.
+    pub path: PathBuf,
+    /// In the order to be shown.
+    pub entries: Vec<Entry>,
+}
+
+/// One thing in a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its name, with the folder's.
+    pub path: PathBuf,
+    /// What it is, by its name.
+    pub kind: Kind,
+    /// Of the file; 0 of a folder.
+    pub bytes: u64,
+}
+
+/// What something in a folder is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// Another folder.
+    Folder,
+    /// A model that is shown at once.
+    Model,
+    /// A raw model that was built before and has not changed since.
+    Built,
+    /// A raw model that is built first.
+    Raw,
+    /// A scene.
+    Scene,
+    /// A camera path.
+    Path,
 }
 
 /// A scene with its models open.
@@ -93,6 +131,7 @@ pub struct Work(Arc<WorkState>);
 struct WorkState {
     cancelled: AtomicBool,
     at: Mutex<Progress>,
+    preview: Mutex<Option<Preview>>,
     changed: Mutex<Option<Box<dyn Fn() + Send>>>,
 }
 
@@ -103,6 +142,17 @@ pub struct Progress {
     pub phase: String,
     /// From 0 to 1; `None` where nobody knows.
     pub part: Option<f32>,
+    /// How long this phase still takes, where that can be told.
+    pub left: Option<Duration>,
+}
+
+/// Something coarse to look at while a model is being built.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    /// Where the model will stand.
+    pub model: Model,
+    /// Points of the model that it is made of; how far it is from the model is not known.
+    pub points: u64,
 }
 
 impl std::fmt::Debug for Work {
@@ -120,16 +170,31 @@ impl Work {
     }
 
     /// Tells how far it is.
-    pub fn at(&self, phase: &str, part: Option<f32>) {
-        let progress = Progress { phase: phase.to_string(), part };
+    pub fn at(&self, phase: &str, part: Option<f32>, left: Option<Duration>) {
+        let progress = Progress { phase: phase.to_string(), part, left };
         let mut at = self.0.at.lock().unwrap_or_else(PoisonError::into_inner);
         if *at != progress {
             *at = progress;
             drop(at);
-            if let Some(changed) = &*self.0.changed.lock().unwrap_or_else(PoisonError::into_inner) {
-                changed();
-            }
+            self.changed();
         }
+    }
+
+    fn changed(&self) {
+        if let Some(changed) = &*self.0.changed.lock().unwrap_or_else(PoisonError::into_inner) {
+            changed();
+        }
+    }
+
+    /// Shows something until the work is done.
+    pub fn preview(&self, preview: Preview) {
+        *self.0.preview.lock().unwrap_or_else(PoisonError::into_inner) = Some(preview);
+        self.changed();
+    }
+
+    /// The preview that has come since the last call.
+    pub(crate) fn take_preview(&self) -> Option<Preview> {
+        self.0.preview.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// How far it is.

@@ -9,13 +9,19 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// How a job ended.
 pub(crate) enum Finished {
-    Opened(Box<Result<Opened, String>>),
+    Opened(JobNumber, Box<Result<Opened, String>>),
+    /// By a person, with the file's name.
+    Cancelled(JobNumber, String),
     Wrote(PathBuf, Result<(), String>),
 }
 
+/// Names a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct JobNumber(u64);
+
 /// A file that is being opened.
 pub(crate) struct Job {
-    number: u64,
+    pub(crate) number: JobNumber,
     pub(crate) name: String,
     pub(crate) work: Work,
 }
@@ -27,8 +33,8 @@ pub(crate) struct Jobs {
     begun: u64,
     /// Files that are being written.
     writing: usize,
-    tell: Sender<(u64, Finished)>,
-    done: Receiver<(u64, Finished)>,
+    tell: Sender<(JobNumber, Finished)>,
+    done: Receiver<(JobNumber, Finished)>,
 }
 
 impl Jobs {
@@ -52,7 +58,11 @@ impl Jobs {
         let work = Work::watched(move || wake());
         let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned();
         let (host, path, progress) = (self.host.clone(), file.to_owned(), work.clone());
-        let number = self.start(move || Finished::Opened(Box::new(host.open(&path, &progress))));
+        let called = name.clone();
+        let number = self.start(move |number| match host.open(&path, &progress) {
+            Err(_) if progress.is_cancelled() => Finished::Cancelled(number, called),
+            opened => Finished::Opened(number, Box::new(opened)),
+        });
         self.running.push(Job { number, name, work });
     }
 
@@ -73,19 +83,19 @@ impl Jobs {
 
     fn write(&mut self, name: PathBuf, write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static) {
         self.writing += 1;
-        self.start(move || {
+        self.start(move |_| {
             let wrote = write(&name);
             Finished::Wrote(name, wrote)
         });
     }
 
-    fn start(&mut self, job: impl FnOnce() -> Finished + Send + 'static) -> u64 {
+    fn start(&mut self, job: impl FnOnce(JobNumber) -> Finished + Send + 'static) -> JobNumber {
         self.begun += 1;
-        let (number, tell, wake) = (self.begun, self.tell.clone(), self.wake.clone());
+        let (number, tell, wake) = (JobNumber(self.begun), self.tell.clone(), self.wake.clone());
         // Without threads nothing works; the system says so where the stage is started.
-        let _ = std::thread::Builder::new().name(format!("job {number}")).spawn(move || {
+        let _ = std::thread::Builder::new().name(format!("job {}", self.begun)).spawn(move || {
             // Who no longer listens needs no answer.
-            let _ = tell.send((number, job()));
+            let _ = tell.send((number, job(number)));
             wake();
         });
         number
@@ -93,7 +103,7 @@ impl Jobs {
 
     /// What has ended since the last call.
     pub(crate) fn finished(&mut self) -> Vec<Finished> {
-        let done: Vec<(u64, Finished)> = self.done.try_iter().collect();
+        let done: Vec<(JobNumber, Finished)> = self.done.try_iter().collect();
         for (number, finished) in &done {
             self.running.retain(|job| job.number != *number);
             self.writing -= usize::from(matches!(finished, Finished::Wrote(..)));

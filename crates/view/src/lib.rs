@@ -24,13 +24,15 @@ pub mod recorder;
 mod report;
 mod settings;
 mod stage;
+#[cfg(test)]
+mod stage_tests;
 mod viewer;
 #[cfg(test)]
 mod viewer_tests;
 mod viewport;
 mod window;
 
-pub use host::{Host, Model, Opened, OpenedScene, Progress, Work};
+pub use host::{Entry, Folder, Host, Kind, Model, Opened, OpenedScene, Preview, Progress, Work};
 pub use mailbox::Figures;
 pub use report::{Measured, Report, Tally, percentile};
 pub use settings::{FirstLook, Options, Settings};

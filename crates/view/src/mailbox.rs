@@ -67,6 +67,10 @@ pub struct Figures {
     pub wish: u64,
     /// Of the cut.
     pub report: CutReport,
+    /// Half of the splats drawn are no larger than this, in pixels: as a sample of them says.
+    pub typical_px: f32,
+    /// Pixels of the screen that a drawn one is wide: more than 1 only while the camera moves.
+    pub pixel_edge_px: f64,
     /// From the beginning of the cut to the end of the drawing, on the clock.
     pub frame_ms: f64,
     /// Of these, the cut.
@@ -101,6 +105,8 @@ struct Inbox {
 #[derive(Default)]
 struct Outbox {
     shown: Option<Shown>,
+    /// Number of the latest frame, while the window has not painted it.
+    unseen: Option<u64>,
     figures: VecDeque<Figures>,
     news: Vec<News>,
 }
@@ -112,6 +118,7 @@ pub(crate) struct Mailbox {
     inbox: Mutex<Inbox>,
     arrived: Condvar,
     outbox: Mutex<Outbox>,
+    seen: Condvar,
     interrupt: Interrupt,
     /// Wakes the window's thread.
     wake: Box<dyn Fn() + Send + Sync>,
@@ -138,6 +145,7 @@ impl Mailbox {
             inbox: Mutex::default(),
             arrived: Condvar::new(),
             outbox: Mutex::default(),
+            seen: Condvar::new(),
             interrupt: Interrupt::default(),
             wake: Box::new(wake),
         }
@@ -193,12 +201,27 @@ impl Mailbox {
     pub(crate) fn show(&self, shown: Option<Shown>, figures: Figures) {
         let mut outbox = self.outbox();
         outbox.shown = shown;
+        outbox.unseen = Some(figures.frames);
         if outbox.figures.len() == MOST_FIGURES {
             outbox.figures.pop_front();
         }
         outbox.figures.push_back(figures);
         drop(outbox);
         (self.wake)();
+    }
+
+    /// The window has done with this frame what it does. One queue orders the device's work: the window would wait for a next frame that was
+    /// handed in earlier.
+    pub(crate) fn painted(&self, frame: u64) {
+        let mut outbox = self.outbox();
+        outbox.unseen = outbox.unseen.filter(|latest| *latest > frame);
+        self.seen.notify_one();
+    }
+
+    /// Waits until the window has painted the latest picture, but not for long.
+    pub(crate) fn wait_until_painted(&self, at_most: Duration) {
+        let is_unseen = |outbox: &mut Outbox| outbox.unseen.is_some();
+        drop(self.seen.wait_timeout_while(self.outbox(), at_most, is_unseen));
     }
 
     pub(crate) fn tell(&self, news: News) {

@@ -7,9 +7,10 @@
 //! What always holds, whatever goes in: the pose is finite; the eye is neither farther away than [`FARTHEST`] views of the whole
 //! nor nearer to its pivot than [`NEAREST`] of the diagonal; and of the *anchors*, balls that hold a part of the model's surface, at
 //! least one is wholly in the picture, so that nobody loses the model. What would break that is done as far as it does
-//! not, or moves the pivot towards the nearest anchor.
+//! not, or moves the pivot towards the nearest anchor. Zoom and flight end before the surface that they are told of, where
+//! [`LEAST_LEAVES`] of its leaves still fill the picture's height. Who zooms out sees the whole model come to the picture's middle.
 
-use gigalod_geom::camera::UpAxis;
+use gigalod_geom::camera::{UpAxis, default_orbit_deg};
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use glam::{DVec2, DVec3};
 
@@ -19,6 +20,9 @@ pub const FARTHEST: f64 = 12.0;
 /// Smallest distance of the eye from its pivot, in diagonals of the model.
 pub const NEAREST: f64 = 1e-7;
 
+/// So many leaves of the surface ahead, one above the other, fill the picture's height at least: nearer there is one flat colour.
+pub const LEAST_LEAVES: f64 = 12.0;
+
 /// Most anchors that are kept, besides points that were picked.
 pub const MOST_ANCHORS: usize = 1024;
 
@@ -27,6 +31,12 @@ const MOST_PICKED: usize = 16;
 
 /// The eye never looks straight up or down: then up would be undefined. In radians.
 const STEEPEST: f64 = 89.9 * std::f64::consts::PI / 180.0;
+
+/// What lies outside after the eye has gone twice as far away is 2 to the minus this of what it was.
+const HOMEWARD: f64 = 3.0;
+
+/// A point is ahead of the eye within so small a tangent of the view axis.
+const AHEAD: f64 = 0.05;
 
 /// A full turn, in radians.
 const TURN: f64 = std::f64::consts::TAU;
@@ -62,7 +72,7 @@ pub enum Input {
         /// Pixels dragged.
         by_px: DVec2,
     },
-    /// Comes nearer to what is under the cursor, which stays there.
+    /// Comes nearer to what is under the cursor, or nearest to it, which stays there.
     Zoom {
         /// What is left of the distance: below 1 is nearer.
         factor: f64,
@@ -76,10 +86,12 @@ pub enum Input {
         /// Pixels dragged.
         by_px: DVec2,
     },
-    /// Flies: right, up, forward, each in distances to the pivot.
+    /// Flies: right, up, forward, each in distances to the pivot; forward in those to the surface ahead where that is nearer.
     Fly {
         /// Along the view's axes.
         by: DVec3,
+        /// The surface point in the middle of the picture, where one is known.
+        ahead: Option<Anchor>,
     },
     /// Turns towards a point of the surface and makes it the pivot.
     Pivot(Anchor),
@@ -119,9 +131,11 @@ impl Navigation {
     pub fn new(bounds: Aabb, up_axis: UpAxis, fov_y_rad: f64, size: ImageSize) -> Self {
         let is_good = !bounds.is_empty() && bounds.min.is_finite() && bounds.max.is_finite();
         let bounds = if is_good { bounds } else { Aabb { min: DVec3::splat(-0.5), max: DVec3::splat(0.5) } };
-        let camera = Camera::orbit(&bounds, up_axis, [0.0, 0.0], 1.0, fov_y_rad, size);
+        let orbit_deg = default_orbit_deg(&bounds, up_axis);
+        let camera = Camera::orbit(&bounds, up_axis, orbit_deg, 1.0, fov_y_rad, size);
         let fit = (camera.eye - bounds.center()).length().max(f64::MIN_POSITIVE);
-        let home = Pose { pivot: bounds.center(), azimuth: 0.0, elevation: 0.0, distance: fit };
+        let [azimuth, elevation] = orbit_deg.map(f64::to_radians);
+        let home = Pose { pivot: bounds.center(), azimuth, elevation, distance: fit };
         Self { bounds, up_axis, anchors: Vec::new(), picked: Vec::new(), fov_y_rad, fit, pose: home, home }
     }
 
@@ -145,6 +159,13 @@ impl Navigation {
             self.keep(size);
             self.home = self.pose;
         }
+    }
+
+    /// Goes on with bounds that hardly differ, as of a model in place of its preview; home is around them.
+    pub fn set_bounds(&mut self, bounds: Aabb, size: ImageSize) {
+        let anew = Self::new(bounds, self.up_axis, self.fov_y_rad, size);
+        (self.bounds, self.fit, self.home) = (anew.bounds, anew.fit, anew.home);
+        self.keep(size);
     }
 
     /// Moves to a pose, as of a camera path, as far as that shows the model.
@@ -217,9 +238,12 @@ impl Navigation {
                 };
                 self.take_as_far(size, look);
             }
-            Input::Fly { by } => {
+            Input::Fly { by, ahead } => {
                 let camera = self.camera(size);
-                let by = (camera.right * by.x + camera.up * by.y + camera.forward * by.z) * before.distance;
+                let room = ahead.map_or(f64::INFINITY, |ahead| room_before(&ahead, &camera));
+                let forward =
+                    if by.z > 0.0 { (by.z * before.distance.min(room)).min(room) } else { by.z * before.distance };
+                let by = (camera.right * by.x + camera.up * by.y) * before.distance + camera.forward * forward;
                 self.take_as_far(size, |part| Pose { pivot: before.pivot + by * part, ..before });
             }
             Input::Pivot(anchor) => {
@@ -261,17 +285,32 @@ impl Navigation {
             self.apply(&Input::Anchor(surface), size);
         }
         let (before, camera) = (self.pose, self.camera(size));
-        // What is under the cursor: a known point, or as far away as the pivot.
-        let depth =
-            surface.map(|surface| camera.view_point(surface.at).z).filter(|depth| depth.is_finite() && *depth > 0.0);
-        let depth = depth.unwrap_or(before.distance);
+        // What is under the cursor: a known point; or what is nearest to it, so that nobody goes past the model; or as far away as the pivot.
+        let in_front = |at: DVec3| Some(camera.view_point(at)).filter(|at| at.is_finite() && at.z > 0.0);
+        let beside = |at: DVec3| Some((camera.pixel_of_view_point(in_front(at)?), in_front(at)?.z));
+        let nearest = || {
+            let places = self.all_anchors().filter_map(|anchor| beside(anchor.at));
+            places.min_by(|a, b| a.0.distance_squared(at_px).total_cmp(&b.0.distance_squared(at_px)))
+        };
+        let known = surface.and_then(|surface| in_front(surface.at)).map(|at| (at_px, at.z));
+        let beside_it = || if factor < 1.0 { nearest() } else { None };
+        let (at_px, depth) = known.or_else(beside_it).unwrap_or((at_px, before.distance));
         let fixed = camera.eye + camera.ray_through(at_px) * depth;
+        // What is left of the distance at the least; where the eye is too near already, it does not come nearer.
+        let least = surface.map_or(0.0, |surface| least_depth(&surface, &camera) / depth).min(1.0);
+        let whole = Whole { middle: self.bounds.center(), fit: self.fit };
+        let astray = whole.astray(&camera);
         self.take_as_far(size, |part| {
             // In equal ratios, so that half the way is half the zoom.
-            let left = factor.powf(part);
+            let left = if factor < 1.0 { factor.powf(part).max(least) } else { factor.powf(part) };
             let eye = fixed + (camera.eye - fixed) * left;
             let distance = depth * left;
-            Pose { pivot: eye + camera.forward * distance, distance, ..before }
+            let pose = Pose { pivot: eye + camera.forward * distance, distance, ..before };
+            if factor < 1.0 {
+                return pose;
+            }
+            let by = whole.way_back(&Camera { eye, ..camera }, astray * left.powf(-HOMEWARD));
+            Pose { pivot: pose.pivot + by, ..pose }
         });
     }
 
@@ -378,6 +417,48 @@ impl Navigation {
     fn least_distance(&self) -> f64 {
         self.bounds.diagonal().max(self.fit * 1e-3) * NEAREST
     }
+}
+
+/// The model as a view of the whole shows it.
+#[derive(Clone, Copy, Debug)]
+struct Whole {
+    /// Of its bounds.
+    middle: DVec3,
+    /// Distance from which it fills the picture.
+    fit: f64,
+}
+
+impl Whole {
+    /// How far, as tangents along the picture's axes, the model's middle lies outside of where it would lie had a person zoomed in from a
+    /// view of the whole at some point of the picture: that is all the picture from close by, and its middle from where all of the
+    /// model is seen.
+    fn astray(&self, camera: &Camera) -> DVec2 {
+        let middle = camera.view_point(self.middle);
+        if middle.z <= 0.0 {
+            return DVec2::ZERO;
+        }
+        let free = camera.tan_half_fov() * (self.fit / middle.z - 1.0).max(0.0);
+        (DVec2::new(middle.x, middle.y).abs() / middle.z - free).max(DVec2::ZERO)
+    }
+
+    /// The way across the view after which the model is no more than so far astray.
+    fn way_back(&self, camera: &Camera, most: DVec2) -> DVec3 {
+        let middle = camera.view_point(self.middle);
+        let by = (self.astray(camera) - most).max(DVec2::ZERO) * middle.z;
+        camera.right * by.x.copysign(middle.x) + camera.up * by.y.copysign(middle.y)
+    }
+}
+
+/// Depth from which [`LEAST_LEAVES`] of a surface fill the picture's height; a ball around a picked point has a leaf's diameter for radius.
+fn least_depth(surface: &Anchor, camera: &Camera) -> f64 {
+    surface.radius * LEAST_LEAVES / (2.0 * camera.tan_half_fov().y)
+}
+
+/// How far the eye may go forward before it is too near to a surface; without end where the surface is not ahead any more.
+fn room_before(surface: &Anchor, camera: &Camera) -> f64 {
+    let at = camera.view_point(surface.at);
+    let is_ahead = at.z > 0.0 && DVec2::new(at.x, at.y).length() < AHEAD * at.z;
+    if is_ahead { (at.z - least_depth(surface, camera)).max(0.0) } else { f64::INFINITY }
 }
 
 /// At most a full turn each: beyond that, sines say little.

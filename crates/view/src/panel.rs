@@ -9,7 +9,7 @@ use gigalod_render::Kernel;
 use gigalod_runtime::Limit;
 use gigalod_runtime::scene::description::{Light, LightKind, Places, SceneCamera, SceneDescription, SceneModel};
 use gigalod_runtime::splats::Tint;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Points.
 pub(crate) const WIDTH: f32 = 320.0;
@@ -20,11 +20,12 @@ impl Viewer {
         Panel::right("panel").exact_size(WIDTH).resizable(false).frame(frame).show(ui, |ui| {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 self.models_section(ui, now);
-                section(ui, "Picture", |ui| self.picture_section(ui));
-                section(ui, "Measure", |ui| self.measure_section(ui));
-                section(ui, "Camera path", |ui| self.path_section(ui, now));
-                section(ui, "Save", |ui| self.save_section(ui, now));
-                section(ui, "Figures", |ui| self.figures_section(ui));
+                section(ui, "Figures", true, |ui| self.figures_section(ui));
+                section(ui, "Picture", true, |ui| self.picture_section(ui));
+                section(ui, "Measure", true, |ui| self.measure_section(ui));
+                section(ui, "Save", true, |ui| self.save_section(ui, now));
+                section(ui, "Camera path", false, |ui| self.path_section(ui, now));
+                section(ui, "Budgets", false, |ui| self.budgets_section(ui));
             });
         });
     }
@@ -33,21 +34,26 @@ impl Viewer {
         ui.add_space(6.0);
         ui.horizontal(|ui| {
             ui.heading("Gigalod");
+            if ui.button("Open…").on_hover_text("Choose a model, a scene, a folder or a camera path").clicked() {
+                self.open(Path::new("."));
+            }
             if ui.button("Home").on_hover_text("Look at everything (Home)").clicked() {
                 self.steer(&Input::Home, now);
             }
             ui.toggle_value(&mut self.shows_help, "Keys (F1)");
-            ui.weak("F2 hides this");
         });
         let mut removed: Option<ModelKey> = None;
-        for Staged { key, model } in &self.models {
+        for Staged { key, model, preview } in &self.models {
             ui.horizontal(|ui| {
                 if ui.small_button("x").on_hover_text("Take this model away").clicked() {
                     removed = Some(*key);
                 }
                 let leaves = model.file.skeleton().root().leaves;
                 let name = model.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                let text = format!("{name}, {} splats", count(leaves));
+                let text = match preview {
+                    Some((_, points)) => format!("{name}, a preview of {} points", count(*points)),
+                    None => format!("{name}, {} splats", count(leaves)),
+                };
                 ui.add(egui::Label::new(text).truncate()).on_hover_text(model.source.display().to_string());
             });
         }
@@ -98,6 +104,12 @@ impl Viewer {
                 }
             });
             ui.end_row();
+        });
+    }
+
+    fn budgets_section(&mut self, ui: &mut Ui) {
+        let settings = &mut self.settings;
+        Grid::new("budgets").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
             ui.label("Memory").on_hover_text("Most memory for decoded pages and lists");
             mebibytes(ui, &mut settings.cpu_budget);
             ui.end_row();
@@ -115,43 +127,74 @@ impl Viewer {
         });
     }
 
+    /// How fine the picture is, in words, and whether that is all there is.
+    fn fineness(&self) -> (&'static str, bool) {
+        let figures = &self.figures;
+        if self.models.is_empty() {
+            return ("nothing to show yet", false);
+        }
+        if self.models.iter().any(|staged| staged.preview.is_some()) {
+            return ("a preview: its error is not known", false);
+        }
+        match (figures.report.limited_by, figures.settled) {
+            _ if figures.frames == 0 => ("the first picture is being drawn", false),
+            (Some(Limit::Residency), false) => ("being loaded", false),
+            (_, false) => ("being refined", false),
+            (None, true) => ("as fine as asked for", true),
+            (Some(Limit::Data), true) => ("as fine as the data are", true),
+            (Some(Limit::Residency), true) => ("as fine as its memory allows", true),
+            (Some(Limit::Budget), true) => ("as fine as a budget allows", true),
+        }
+    }
+
     fn figures_section(&mut self, ui: &mut Ui) {
+        let (words, is_done) = self.fineness();
+        let color = if is_done { Color32::from_rgb(130, 200, 140) } else { Color32::from_rgb(220, 190, 110) };
+        ui.colored_label(color, words);
+        if self.models.is_empty() || self.figures.frames == 0 {
+            return;
+        }
         self.plot(ui);
         let figures = &self.figures;
         let report = &figures.report;
-        let error = if report.max_error_px.is_finite() {
-            format!("{:.2} px", report.max_error_px)
-        } else {
-            "around the eye".to_string()
+        let largest = match report.max_error_px {
+            px if px.is_finite() => format!("{px:.2} px"),
+            _ => "around the eye".to_string(),
         };
-        let limit = match (report.limited_by, figures.settled) {
-            (Some(Limit::Data), true) => "as fine as the data",
-            (Some(Limit::Data), false) => "limited by the data",
-            (Some(Limit::Residency), _) => "limited by residency: loading",
-            (Some(Limit::Budget), _) => "limited by a budget",
-            (None, true) => "as fine as asked for",
-            (None, false) => "being refined",
+        let rows = |ui: &mut Ui, name: &str, rows: &[(&str, &str, String)]| {
+            Grid::new(name).num_columns(2).spacing([8.0, 2.0]).show(ui, |ui| {
+                for (name, explained, value) in rows {
+                    ui.label(*name).on_hover_text(*explained);
+                    ui.monospace(value);
+                    ui.end_row();
+                }
+            });
         };
-        Grid::new("figures").num_columns(2).spacing([8.0, 2.0]).show(ui, |ui| {
-            let mut row = |name: &str, value: String| {
-                ui.label(name);
-                ui.monospace(value);
-                ui.end_row();
-            };
-            row("frame", format!("{:.0} ms, {:.0} to select", figures.frame_ms, figures.select_ms));
-            row("error on screen", error);
-            row("", limit.to_string());
-            row("threshold", format!("{:.2} px", report.threshold_px));
-            row("splats drawn", count(report.drawn));
-            row("nodes visited", count(report.visited));
-            row("page misses", count(figures.misses));
-            row("pages resident", bytes(figures.resident_bytes));
-            row("memory", bytes(figures.cpu_bytes));
-            row("device memory", bytes(figures.gpu_bytes));
-            row("read", bytes(figures.bytes_read));
-            row("window", format!("{}x{}", self.size.width, self.size.height));
+        let explained = "No point of the surface is drawn farther off than this: the diameter of the largest splat. Where the \
+                         data end, as close up, it is larger than asked for";
+        let main = [
+            ("largest splat", explained, largest),
+            ("typical splat", "Half of the splats are no larger than this", format!("{:.2} px", figures.typical_px)),
+            ("splats drawn", "Of all that there are", count(report.drawn)),
+            ("frame", "Choosing what to draw, and drawing it", format!("{:.0} ms", figures.frame_ms)),
+            ("read", "From the file, so far", bytes(figures.bytes_read)),
+        ];
+        rows(ui, "figures", &main);
+        let more = [
+            ("threshold", "Error that the last frame was cut at", format!("{:.2} px", report.threshold_px)),
+            ("pixels", "Of the screen, that a drawn one is wide", format!("{:.2} px wide", figures.pixel_edge_px)),
+            ("to select", "Part of the frame's time", format!("{:.1} ms", figures.select_ms)),
+            ("nodes visited", "By that choice", count(report.visited)),
+            ("page misses", "Pages that would have made it finer and were not there", count(figures.misses)),
+            ("pages resident", "Decoded", bytes(figures.resident_bytes)),
+            ("memory", "Pages and lists", bytes(figures.cpu_bytes)),
+            ("device memory", "Buffers and targets", bytes(figures.gpu_bytes)),
+            ("picture", "Physical pixels", format!("{}x{}", self.size.width, self.size.height)),
+        ];
+        CollapsingHeader::new("more").id_salt("more figures").show(ui, |ui| {
+            rows(ui, "more", &more);
+            ui.add(egui::Label::new(egui::RichText::new(&self.adapter).weak()).truncate());
         });
-        ui.add(egui::Label::new(egui::RichText::new(&self.adapter).weak()).truncate());
     }
 
     /// Times of the last frames, with the one aimed at.
@@ -277,8 +320,8 @@ impl Viewer {
     }
 }
 
-fn section(ui: &mut Ui, name: &str, contents: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(name).default_open(true).show(ui, contents);
+fn section(ui: &mut Ui, name: &str, is_open: bool, contents: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(name).default_open(is_open).show(ui, contents);
 }
 
 fn mebibytes(ui: &mut Ui, bytes: &mut u64) {
@@ -314,7 +357,7 @@ pub(crate) fn count(number: u64) -> String {
     text
 }
 
-fn bytes(number: u64) -> String {
+pub(crate) fn bytes(number: u64) -> String {
     match number {
         0..1024 => format!("{number} B"),
         1024..1_048_576 => format!("{:.1} KiB", number as f64 / 1024.0),

@@ -25,6 +25,8 @@ pub(crate) enum Purpose {
     Zoom,
     /// To turn around it.
     Pivot,
+    /// Not to fly through it.
+    Ahead,
     /// To measure from or to it; numbered by who asks.
     Measure(u64),
 }
@@ -103,7 +105,7 @@ impl<W: Fn() + Send + Sync + 'static> Picker<W> {
             }
             waiting.extend(questions.try_iter());
             let question = waiting.remove(0);
-            if let Question::Point { purpose: Purpose::Zoom | Purpose::Pivot, .. } = question {
+            if let Question::Point { purpose: Purpose::Zoom | Purpose::Pivot | Purpose::Ahead, .. } = question {
                 let is_newer = |other: &Question| match (other, &question) {
                     (Question::Point { purpose: other, .. }, Question::Point { purpose, .. }) => other == purpose,
                     _ => false,

@@ -52,6 +52,8 @@ impl Default for Settings {
 /// Where the first look is from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FirstLook {
+    /// As `render` looks at it by default.
+    Whole,
     /// Azimuth and elevation in degrees, and how many times nearer than a view of the whole.
     Orbit([f64; 3]),
     /// World space.

@@ -11,7 +11,9 @@ use crate::mailbox::{Figures, Mail, Mailbox, ModelKey, News, Order, Wish};
 use crate::settings::Settings;
 use gigalod_render::{Frame, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
-use gigalod_runtime::{CutReport, Fineness, FrameRate, Instance, InstanceId, Residency, Scene, ViewId};
+use gigalod_runtime::{
+    CutReport, DrawSource, Fineness, FrameRate, Instance, InstanceId, Magnified, Residency, Scene, ViewId,
+};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,8 +24,22 @@ const CAMERA: ViewId = ViewId(0);
 /// Where there is no memory for so few, coarser will not help.
 const FEWEST_SPLATS: u64 = 1000;
 
+/// Splats that are looked at to tell a typical one, about.
+const SAMPLE: usize = 500;
+
+/// A window that takes longer to paint, or is hidden, is not waited for.
+const LONGEST_PAINTING: Duration = Duration::from_millis(30);
+
 /// How often pages that are being loaded are looked for, while there is nothing else to do.
 const LOOK_FOR_PAGES: Duration = Duration::from_millis(4);
+
+/// A finished frame.
+struct Drawn {
+    wish: Wish,
+    threshold_px: f32,
+    /// Pixels of the screen that a drawn one is wide.
+    pixel_edge_px: f64,
+}
 
 pub(crate) struct Stage {
     mailbox: Arc<Mailbox>,
@@ -33,7 +49,7 @@ pub(crate) struct Stage {
     control: FrameRate,
     wish: Option<(u64, Wish)>,
     /// What the last finished frame shows.
-    drawn: Option<(Wish, CutReport)>,
+    drawn: Option<Drawn>,
     /// The next frame shows something else than the last one.
     changed: bool,
     /// Drawing is in vain until something changes.
@@ -58,7 +74,7 @@ impl Stage {
             renderer,
             scene,
             instances: BTreeMap::new(),
-            control: FrameRate::new(settings.target_ms, settings.finest_px),
+            control: FrameRate::new(settings.target_ms, settings.finest_px).with_larger_pixels(),
             wish: None,
             drawn: None,
             changed: true,
@@ -106,7 +122,10 @@ impl Stage {
 
     /// True where the last frame was as fine as resident pages allow, and others are on their way.
     fn waits_for_pages(&self) -> bool {
-        let finest = self.drawn.as_ref().is_some_and(|(wish, report)| report.threshold_px <= wish.finest_px);
+        let finest = self
+            .drawn
+            .as_ref()
+            .is_some_and(|drawn| drawn.threshold_px <= drawn.wish.finest_px && drawn.pixel_edge_px == 1.0);
         finest && self.scene.residency().is_loading()
     }
 
@@ -118,7 +137,7 @@ impl Stage {
         // Before it is gone.
         self.take_pictures();
         if before.is_none_or(|before| before.target_ms != wish.target_ms || before.finest_px != wish.finest_px) {
-            self.control = FrameRate::new(wish.target_ms, wish.finest_px);
+            self.control = FrameRate::new(wish.target_ms, wish.finest_px).with_larger_pixels();
         }
         if before.is_none_or(|before| before.cpu_budget != wish.cpu_budget) {
             self.scene.set_cpu_budget(wish.cpu_budget);
@@ -179,20 +198,36 @@ impl Stage {
         let misses = self.scene.draws(CAMERA).map(|(_, selection)| selection.requests.len() as u64).sum();
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-        let drawn = self.renderer.draw(&Frame { camera: wish.camera, look: wish.look, draws });
+        let pixel_edge_px = self.control.pixel_edge_px(&report, select_ms, self.scene.area_px(CAMERA, &wish.camera));
+        let magnified = Magnified::new(&wish.camera, pixel_edge_px);
+        let frame = Frame { camera: *magnified.camera(), look: wish.look, draws };
+        let typical_px = typical_px(&frame, wish.camera.focal_px());
+        let waited = Instant::now();
+        self.mailbox.wait_until_painted(LONGEST_PAINTING);
+        let waited = waited.elapsed();
+        if !moved && self.mailbox.interrupt().is_set() {
+            // Something else is wished for; what would be drawn in detail is not what a person waits for.
+            self.scene.serve();
+            return;
+        }
+        let drawn = self.renderer.draw(&frame);
         self.scene.serve();
         if let Err(error) = drawn {
             self.survive(error, &report);
             return;
         }
-        let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let frame_ms = (begun.elapsed() - waited).as_secs_f64() * 1e3;
         self.control.drew(frame_ms, &report, self.scene.residency().is_loading());
         self.changed = false;
-        self.drawn = Some((*wish, report));
+        self.drawn = Some(Drawn { wish: *wish, threshold_px: report.threshold_px, pixel_edge_px });
+        // As it is on the screen.
+        let report = magnified.report(&report);
         self.frames += 1;
         let figures = Figures {
             wish: number,
             report,
+            typical_px,
+            pixel_edge_px,
             frame_ms,
             select_ms,
             cpu_ms: thread_cpu_ms() - cpu_begun,
@@ -210,11 +245,7 @@ impl Stage {
 
     fn survive(&mut self, error: RenderError, report: &CutReport) {
         match error {
-            RenderError::DeviceLost(why) => {
-                self.lost = true;
-                self.mailbox.forget_shown();
-                self.mailbox.tell(News::DeviceLost(why));
-            }
+            RenderError::DeviceLost(why) => self.lose(why),
             RenderError::OutOfMemory(why) if report.drawn > FEWEST_SPLATS => {
                 self.most_splats = report.drawn / 2;
                 let text = format!("the graphics device is out of memory, drawn coarser: {why}");
@@ -227,12 +258,25 @@ impl Stage {
         }
     }
 
+    fn lose(&mut self, why: String) {
+        self.lost = true;
+        self.mailbox.forget_shown();
+        self.mailbox.tell(News::DeviceLost(why));
+    }
+
     /// Draws what is shown once more, for a file.
     fn take_pictures(&mut self) {
-        let Some((wish, _)) = self.drawn.as_ref().filter(|_| !self.pictures.is_empty() && !self.lost) else { return };
+        let Some(Drawn { wish, .. }) = self.drawn.as_ref().filter(|_| !self.pictures.is_empty() && !self.lost) else {
+            return;
+        };
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
         let picture = self.renderer.picture(&Frame { camera: wish.camera, look: wish.look, draws });
+        if let Err(RenderError::DeviceLost(why)) = picture {
+            // The next device draws them.
+            self.lose(why);
+            return;
+        }
         for name in std::mem::take(&mut self.pictures) {
             self.mailbox.tell(match &picture {
                 Ok(picture) => News::Picture(name, picture.size, picture.rgba.clone()),
@@ -249,4 +293,23 @@ impl Stage {
         }
         problems
     }
+}
+
+/// Median diameter of what is drawn, in pixels of the screen across the view axis, of a sample; 0 where nothing is.
+fn typical_px(frame: &Frame<'_>, focal_px: f64) -> f32 {
+    // Sizes and distances are in the same units, those of the model.
+    let pieces = || {
+        let lists = frame.draws.iter().filter_map(|(_, source)| match source {
+            DrawSource::Splats(list) => Some(&list.pieces),
+            _ => None,
+        });
+        lists.flatten().map(|piece| &piece.balls[..])
+    };
+    let step = (pieces().map(<[_]>::len).sum::<usize>() / SAMPLE).max(1);
+    let mut diameters: Vec<f32> = pieces()
+        .flat_map(|balls| balls.iter().step_by(step))
+        .map(|ball| 2.0 * focal_px as f32 * ball.radius / glam::Vec3::from_array(ball.center_in_eye).length())
+        .collect();
+    let middle = diameters.len() / 2;
+    if diameters.is_empty() { 0.0 } else { *diameters.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }

@@ -3,8 +3,8 @@
 //! Goes in: egui's events, figures of the stage, answers of the picker, files that were opened. Comes out: egui's shapes, wishes and
 //! orders for the stage. What always holds: nothing here waits or reads a file; every error ends as a notice on the screen.
 
-use crate::host::{Host, Model, Opened, OpenedScene, up_of};
-use crate::jobs::{Finished, Jobs};
+use crate::host::{Folder, Host, Model, Opened, OpenedScene, Preview, up_of};
+use crate::jobs::{Finished, JobNumber, Jobs};
 use crate::mailbox::{Figures, Mailbox, ModelKey, News, Order, Wish};
 use crate::measure::Measuring;
 use crate::navigation::{Anchor, Input, Navigation};
@@ -33,6 +33,8 @@ pub(crate) struct Notice {
 pub(crate) struct Staged {
     pub(crate) key: ModelKey,
     pub(crate) model: Model,
+    /// Of a preview: who builds the model, and how many of its points are shown.
+    pub(crate) preview: Option<(JobNumber, u64)>,
 }
 
 /// Everything but the window and the device.
@@ -51,7 +53,7 @@ pub(crate) struct Viewer {
     pub(crate) recorder: Recorder,
     pub(crate) measuring: Measuring,
     pub(crate) notices: Vec<Notice>,
-    pub(crate) folder: Option<Vec<PathBuf>>,
+    pub(crate) folder: Option<Folder>,
     pub(crate) figures: Figures,
     /// Milliseconds of the last frames.
     pub(crate) frame_times: std::collections::VecDeque<f32>,
@@ -60,17 +62,35 @@ pub(crate) struct Viewer {
     pub(crate) shows_panel: bool,
     /// A drag without modifiers turns the eye on the spot.
     pub(crate) flies: bool,
-    /// A surface point that was found under the cursor, and where that was.
-    pub(crate) under_cursor: Option<(DVec2, Anchor)>,
+    /// What was found under the cursor, and where that was.
+    pub(crate) under_cursor: Option<(DVec2, Option<Anchor>)>,
+    /// Zoom that waits for that: how much, where, since when.
+    pub(crate) zoom_to_come: Option<ZoomToCome>,
+    /// What was found in the middle of the picture during flight.
+    pub(crate) ahead: Option<Anchor>,
     pub(crate) size: ImageSize,
     pub(crate) adapter: String,
-    pub(crate) wants_recovery: bool,
+    /// Why the stage has no device any more.
+    pub(crate) wants_recovery: Option<String>,
+    /// A person wants another device.
+    pub(crate) wants_new_device: bool,
     pub(crate) wants_to_quit: bool,
     last_wish: Option<Wish>,
     wish_number: u64,
     told_problems: Vec<String>,
     /// What is to be told at exit.
     pub(crate) tally: Tally,
+}
+
+/// Zoom towards something that is being looked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ZoomToCome {
+    /// What is left of the distance.
+    pub(crate) factor: f64,
+    /// Where the cursor is, in physical pixels.
+    pub(crate) at_px: DVec2,
+    /// Seconds of egui's clock.
+    pub(crate) since: f64,
 }
 
 /// Names of files to write, as a person may change them.
@@ -112,9 +132,12 @@ impl Viewer {
             shows_panel: true,
             flies: false,
             under_cursor: None,
+            zoom_to_come: None,
+            ahead: None,
             size: options.size,
             adapter: String::new(),
-            wants_recovery: false,
+            wants_recovery: None,
+            wants_new_device: false,
             wants_to_quit: false,
             last_wish: None,
             wish_number: 0,
@@ -195,6 +218,9 @@ impl Viewer {
             self.recorder.pause();
             self.navigation.go_to(played.eye, played.target, self.size);
         }
+        if !matches!(input, Input::Zoom { .. }) {
+            (self.under_cursor, self.zoom_to_come) = (None, None);
+        }
         self.navigation.apply(input, self.size);
     }
 
@@ -240,22 +266,34 @@ impl Viewer {
         for news in delivery.news {
             match news {
                 News::Picture(name, size, rgba) => self.jobs.write_picture(name, size, rgba),
-                News::DeviceLost(why) => {
-                    self.wants_recovery = true;
-                    self.notice(&format!("the graphics device was lost and is opened anew: {why}"), now);
-                }
+                News::DeviceLost(why) => self.wants_recovery = Some(why),
                 News::Problem(problem) => self.notice_error(&problem),
             }
         }
         while let Ok(answer) = self.answers.try_recv() {
-            self.hear(answer);
+            self.hear(answer, now);
+        }
+        let previews: Vec<(JobNumber, Preview)> =
+            self.jobs.running().iter().filter_map(|job| Some((job.number, job.work.take_preview()?))).collect();
+        for (job, Preview { model, points }) in previews {
+            self.add(model, Some((job, points)));
+            self.show_whole();
         }
         for finished in self.jobs.finished() {
             match finished {
-                Finished::Opened(opened) => match *opened {
-                    Ok(opened) => self.take(opened, now),
-                    Err(error) => self.notice_error(&error),
-                },
+                Finished::Opened(job, opened) => {
+                    let previews = self.previews_of(job);
+                    match *opened {
+                        Ok(opened) => self.take(opened, !previews.is_empty(), now),
+                        Err(error) => self.notice_error(&error),
+                    }
+                    // Not before the model is there: something is shown all the time.
+                    previews.into_iter().for_each(|key| self.remove(key));
+                }
+                Finished::Cancelled(job, name) => {
+                    self.notice(&format!("{name}: cancelled"), now);
+                    self.previews_of(job).into_iter().for_each(|key| self.remove(key));
+                }
                 Finished::Wrote(path, Ok(())) => {
                     self.tally.written.push(path.display().to_string());
                     self.notice(&format!("written: {}", path.display()), now);
@@ -265,15 +303,24 @@ impl Viewer {
         }
     }
 
-    /// Shows what was opened.
-    fn take(&mut self, opened: Opened, now: f64) {
+    fn previews_of(&self, job: JobNumber) -> Vec<ModelKey> {
+        let is_of_job = |staged: &&Staged| staged.preview.is_some_and(|(number, _)| number == job);
+        self.models.iter().filter(is_of_job).map(|staged| staged.key).collect()
+    }
+
+    /// Shows what was opened; from where a person looks at its preview, if there was one.
+    fn take(&mut self, opened: Opened, had_preview: bool, now: f64) {
         match opened {
             Opened::Model(model) => {
-                self.add(model);
-                self.show_whole();
+                self.add(model, None);
+                if had_preview {
+                    self.navigation.set_bounds(self.bounds(), self.size);
+                } else {
+                    self.show_whole();
+                }
             }
             Opened::Scene(scene) => self.show_scene(scene),
-            Opened::Folder(files) => self.folder = Some(files),
+            Opened::Folder(folder) => self.folder = Some(folder),
             Opened::Path(path) => {
                 self.recorder.load(path);
                 self.recorder.play(now);
@@ -281,7 +328,7 @@ impl Viewer {
         }
     }
 
-    fn hear(&mut self, answer: Answer) {
+    fn hear(&mut self, answer: Answer, now: f64) {
         match answer {
             Answer::Anchors(anchors) => self.navigation.set_anchors(&anchors, self.size),
             Answer::Problem(problem) => self.notice_error(&problem),
@@ -294,26 +341,29 @@ impl Viewer {
             Answer::Point { purpose: Purpose::Pivot, found: Some(found), .. } => {
                 self.navigation.apply(&Input::Pivot(found.anchor()), self.size);
             }
-            Answer::Point { purpose: Purpose::Zoom, at_px, found: Some(found) } => {
-                self.under_cursor = Some((at_px, found.anchor()));
-                self.navigation.apply(&Input::Anchor(found.anchor()), self.size);
+            Answer::Point { purpose: Purpose::Zoom, at_px, found } => {
+                self.under_cursor = Some((at_px, found.map(|found| found.anchor())));
+                if let Some(ZoomToCome { factor, at_px, .. }) = self.zoom_to_come.take() {
+                    self.zoom(at_px, factor, now);
+                }
             }
+            Answer::Point { purpose: Purpose::Ahead, found, .. } => self.ahead = found.map(|found| found.anchor()),
             Answer::Point { .. } => {}
         }
     }
 
     /// Puts a model on the stage.
-    fn add(&mut self, model: Model) {
+    fn add(&mut self, model: Model, preview: Option<(JobNumber, u64)>) {
         let key = ModelKey(self.next_key);
         self.next_key += 1;
         self.mailbox.order(Order::Add(key, model.file.clone(), model.placements.clone()));
         let _ = self.ask.send(Question::Add(key, model.clone()));
-        let stem = model.source.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         if self.models.is_empty() {
+            let stem = stem_of(&model.source);
             self.names =
                 Names { picture: format!("{stem}-1.png"), path: format!("{stem}.json"), scene: format!("{stem}.toml") };
         }
-        self.models.push(Staged { key, model });
+        self.models.push(Staged { key, model, preview });
     }
 
     pub(crate) fn remove(&mut self, key: ModelKey) {
@@ -331,7 +381,7 @@ impl Viewer {
         self.settings.background = description.background.unwrap_or(self.settings.background);
         self.settings.towards_light = description.towards_light();
         description.not_drawn().iter().for_each(|missing| self.notice_error(missing));
-        models.into_iter().for_each(|model| self.add(model));
+        models.into_iter().for_each(|model| self.add(model, None));
         let camera = description.camera.unwrap_or_default();
         self.fov_deg = camera.fov_deg.unwrap_or(self.fov_deg);
         self.show_whole();
@@ -364,17 +414,15 @@ impl Viewer {
     fn show_whole(&mut self) {
         let (bounds, up, fov) = (self.bounds(), self.up(), self.fov_deg.to_radians());
         self.navigation = Navigation::new(bounds, up, fov, self.size);
-        let (eye, target) = match self.first_look {
-            FirstLook::From { eye, target } => (eye, target),
+        match self.first_look {
+            FirstLook::Whole => {}
+            FirstLook::From { eye, target } => self.navigation.set_home(eye, target, self.size),
             FirstLook::Orbit([azimuth, elevation, zoom]) => {
                 let camera = Camera::orbit(&bounds, up, [azimuth, elevation], zoom, fov, self.size);
-                (camera.eye, bounds.center())
+                self.navigation.set_home(camera.eye, bounds.center(), self.size);
             }
-        };
-        if self.first_look != FirstLook::Orbit([0.0, 0.0, 1.0]) {
-            self.navigation.set_home(eye, target, self.size);
         }
-        self.under_cursor = None;
+        (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
     }
 
     /// At exit, when nobody looks any more: ends builds, and waits until all that is being written is on disk.
@@ -388,8 +436,16 @@ impl Viewer {
     }
 
     /// Tells something that may be forgotten.
+    /// Tells news, in the place of older news.
     pub(crate) fn notice(&mut self, text: &str, now: f64) {
+        self.notices.retain(|notice| notice.is_error);
         self.notices.push(Notice { text: text.to_string(), is_error: false, until: now + 6.0 });
+    }
+
+    /// Tells of something that went wrong and was put right.
+    pub(crate) fn notice_mended(&mut self, text: &str, now: f64) {
+        self.tally.problems.push(text.to_string());
+        self.notice(text, now);
     }
 
     /// Tells an error, once as long as it is shown.
@@ -425,6 +481,13 @@ impl Viewer {
     }
 }
 
+/// `a/scan.ply.gz` → `scan`.
+fn stem_of(model: &Path) -> String {
+    let name = model.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 /// `statue-1.png` → `statue-2.png`; a name without a number gets one.
 fn next_name(name: &str) -> String {
     let path = Path::new(name);
@@ -440,7 +503,13 @@ fn next_name(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::next_name;
+    use super::{Path, next_name, stem_of};
+
+    #[test]
+    fn what_is_saved_is_called_as_the_model() {
+        let stems = ["a/scan.ply.gz", "lion.copc.laz", "b"].map(|name| stem_of(Path::new(name)));
+        assert_eq!(stems, ["scan", "lion.copc", "b"]);
+    }
 
     #[test]
     fn names_count_up() {

@@ -1,7 +1,7 @@
 //! The user interface without a window: egui's own harness plays a person, a host in memory the files.
 
-use crate::host::{Host, Model, Opened, Work};
-use crate::mailbox::{Mailbox, Order};
+use crate::host::{Entry, Folder, Host, Kind, Model, Opened, Preview, Work};
+use crate::mailbox::{Figures, Mailbox, Order};
 use crate::pick::{Hit, Ray};
 use crate::picker;
 use crate::settings::{FirstLook, Options, Settings};
@@ -13,11 +13,12 @@ use gigalod_build::NoProgress;
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, FileStore};
 use gigalod_geom::{CameraPath, ImageSize};
-use gigalod_runtime::Similarity;
 use gigalod_runtime::scene::description::SceneDescription;
+use gigalod_runtime::{CutReport, Limit, Similarity};
 use gigalod_synth::{Order as VertexOrder, StatueOptions};
 use glam::{DVec2, DVec3};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -29,6 +30,8 @@ const MIDDLE: Pos2 = pos2(350.0, 350.0);
 /// One statue, whatever is asked for; and a list of what was written.
 struct Files {
     statue: Model,
+    /// A raw model may be ready.
+    built: AtomicBool,
     written: Mutex<Vec<(PathBuf, String)>>,
 }
 
@@ -40,10 +43,25 @@ impl Files {
 }
 
 impl Host for Files {
-    fn open(&self, path: &Path, _work: &Work) -> Result<Opened, String> {
+    fn open(&self, path: &Path, work: &Work) -> Result<Opened, String> {
         match path.to_str() {
+            Some("raw.ply") => {
+                work.preview(Preview { model: self.statue.clone(), points: 1234 });
+                work.at("tree", Some(0.4), Some(Duration::from_secs(90)));
+                while !self.built.load(Ordering::Relaxed) {
+                    if work.is_cancelled() {
+                        return Err("raw.ply: cancelled".into());
+                    }
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                Ok(Opened::Model(self.statue.clone()))
+            }
             Some("statue.glod") => Ok(Opened::Model(self.statue.clone())),
-            Some("folder") => Ok(Opened::Folder(vec!["statue.glod".into(), "other.ply".into()])),
+            Some("folder") => {
+                let entry = |path: &str, kind, bytes| Entry { path: path.into(), kind, bytes };
+                let entries = vec![entry("statue.glod", Kind::Model, 4096), entry("other.ply", Kind::Built, 7 << 20)];
+                Ok(Opened::Folder(Folder { path: "/models".into(), entries }))
+            }
             _ => Err(format!("{}: no such file", path.display())),
         }
     }
@@ -65,7 +83,7 @@ impl Host for Files {
     }
 }
 
-fn statue(folder: &Path) -> Arc<SplatFile> {
+pub(crate) fn statue(folder: &Path) -> Arc<SplatFile> {
     let scan = folder.join("statue.ply");
     let options = StatueOptions { triangles: 20_000, seed: 3, colors: false, order: VertexOrder::Coherent };
     let mut out = std::fs::File::create(&scan).unwrap();
@@ -93,12 +111,12 @@ impl Person {
             original: None,
             placements: vec![Similarity::IDENTITY],
         };
-        let files = Arc::new(Files { statue, written: Mutex::default() });
+        let files = Arc::new(Files { statue, built: AtomicBool::new(false), written: Mutex::default() });
         let options = Options {
             files: names.iter().map(PathBuf::from).collect(),
             settings: Settings::default(),
             fov_deg: 40.0,
-            first_look: FirstLook::Orbit([0.0, 0.0, 1.0]),
+            first_look: FirstLook::Whole,
             size: SIZE,
         };
         let mailbox = Arc::new(Mailbox::new(|| {}));
@@ -166,7 +184,8 @@ impl Person {
             source: egui::MouseWheelSource::Wheel,
             modifiers: Modifiers::NONE,
         });
-        self.harness.run_steps(20);
+        // Zoom waits for what is under the cursor.
+        self.harness.run_steps(30);
     }
 
     fn presses(&mut self, key: egui::Key) {
@@ -205,6 +224,9 @@ fn a_file_that_cannot_be_opened_is_told_and_a_folder_is_a_choice() {
     let mut person = Person::opens(&["missing.ply", "folder"]);
     assert!(person.harness.query_by_label_contains("missing.ply: no such file").is_some());
     assert!(person.harness.state().models.is_empty());
+    for told in ["/models", "ready", "4.0 KiB", "built before", "7.0 MiB"] {
+        assert!(person.harness.query_by_label(told).is_some(), "{told}");
+    }
     person.clicks_on("statue.glod");
     person.waits_until(|viewer| viewer.models.len() == 1);
     assert!(person.harness.query_by_label("other.ply").is_none(), "the choice is made");
@@ -309,6 +331,8 @@ fn whoever_drags_at_random_does_not_lose_the_model() {
 fn a_path_is_recorded_played_and_saved() {
     let mut person = Person::opens(&["statue.glod"]);
     let home = person.viewer().own_viewpoint();
+    person.clicks_on("Camera path");
+    person.harness.run_steps(30);
     person.clicks_on("Record (R)");
     person.drags(MIDDLE, MIDDLE + vec2(120.0, -40.0), PointerButton::Primary, Modifiers::NONE);
     person.clicks_on("Stop (R)");
@@ -371,4 +395,88 @@ fn what_is_chosen_in_the_panel_is_wished_for() {
     assert!(person.harness.query_by_label("Mouse and keys").is_some());
     person.presses(egui::Key::F2);
     assert!(person.harness.query_by_label("levels").is_none(), "the panel is hidden");
+}
+
+#[test]
+fn a_preview_is_shown_until_the_model_is_there_and_nobody_is_moved() {
+    let mut person = Person::opens(&[]);
+    person.viewer().open(Path::new("raw.ply"));
+    person.waits_until(|viewer| viewer.models.len() == 1 && viewer.navigation.has_anchors());
+    for told in ["a preview of 1 234 points", "a preview: its error is not known", "1 min 30 s left", "tree, 40 %"] {
+        assert!(person.harness.query_by_label_contains(told).is_some(), "{told}");
+    }
+    person.drags(MIDDLE, MIDDLE + vec2(80.0, 30.0), PointerButton::Primary, Modifiers::NONE);
+    let before = person.viewer().own_viewpoint();
+    person.files.built.store(true, Ordering::Relaxed);
+    person.waits_until(|viewer| viewer.jobs.running().is_empty());
+    assert!(person.viewer().models.iter().all(|staged| staged.preview.is_none()));
+    assert_eq!(person.viewer().models.len(), 1);
+    assert_eq!(person.viewer().own_viewpoint(), before);
+    let orders = person.viewer().mailbox.receive(Some(Duration::ZERO)).orders;
+    let [Order::Add(preview, ..), Order::Add(model, ..), Order::Remove(gone)] = &orders[..] else {
+        panic!("{}: something is shown all the time", orders.len());
+    };
+    assert!(gone == preview && model != preview);
+}
+
+#[test]
+fn a_build_that_is_cancelled_takes_its_preview_along() {
+    let mut person = Person::opens(&[]);
+    person.viewer().open(Path::new("raw.ply"));
+    person.waits_until(|viewer| viewer.models.len() == 1);
+    person.clicks_on("Cancel");
+    person.waits_until(|viewer| viewer.jobs.running().is_empty());
+    assert!(person.viewer().models.is_empty());
+    assert!(person.harness.query_by_label_contains("raw.ply: cancelled").is_some());
+}
+
+#[test]
+fn the_panel_fits_a_small_window_and_says_how_fine_the_picture_is() {
+    let person = Person::opens(&[]);
+    assert!(person.harness.query_by_label("nothing to show yet").is_some());
+    let mut person = {
+        drop(person);
+        Person::opens(&["statue.glod"])
+    };
+    let mut shows = |limited_by, settled| {
+        let report = CutReport { max_error_px: 7.3, threshold_px: 1.0, limited_by, ..Default::default() };
+        let figures = Figures { report, typical_px: 2.1, settled, frames: 1, ..Default::default() };
+        person.viewer().mailbox.show(None, figures);
+        person.harness.run_steps(2);
+        let told = |text: &str| person.harness.query_by_label(text).is_some();
+        assert!(told("7.30 px") && told("2.10 px"));
+        [
+            "as fine as the data are",
+            "as fine as asked for",
+            "as fine as a budget allows",
+            "being loaded",
+            "being refined",
+        ]
+        .into_iter()
+        .filter(|text| told(text))
+        .collect::<Vec<_>>()
+    };
+    assert_eq!(shows(Some(Limit::Data), true), ["as fine as the data are"]);
+    assert_eq!(shows(Some(Limit::Data), false), ["being refined"]);
+    assert_eq!(shows(Some(Limit::Residency), false), ["being loaded"]);
+    assert_eq!(shows(Some(Limit::Budget), true), ["as fine as a budget allows"]);
+    assert_eq!(shows(None, true), ["as fine as asked for"]);
+    let last = person.harness.get_by_label("Budgets").rect();
+    assert!(last.bottom() < SIZE.height as f32, "{last}: all sections can be seen");
+}
+
+#[test]
+fn who_comes_near_stops_before_the_surface() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.waits_until(|viewer| viewer.navigation.has_anchors());
+    for _ in 0..30 {
+        person.turns_wheel(MIDDLE, 300.0);
+    }
+    let at = person.viewer().own_viewpoint();
+    let camera = person.viewer().camera(&at);
+    let (x, y) = (f64::from(MIDDLE.x), f64::from(MIDDLE.y));
+    let ray = Ray { origin: camera.eye, direction: camera.ray_through(DVec2::new(x, y)) };
+    let hit = crate::pick::Pages::default().first_hit(&person.files.statue.file, &ray).unwrap().expect("a surface");
+    let leaves = hit.t * 2.0 * camera.tan_half_fov().y / (2.0 * hit.radius);
+    assert!((8.0..40.0).contains(&leaves), "{leaves} leaves, one above the other");
 }

@@ -1,12 +1,13 @@
 //! Mouse and keys over the picture.
 
 use crate::measure::digits;
-use crate::navigation::Input;
+use crate::navigation::{Anchor, Input};
 use crate::picker::Purpose;
-use crate::viewer::Viewer;
+use crate::viewer::{Viewer, ZoomToCome};
 use egui::{Align2, Color32, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
 use gigalod_geom::Camera;
 use glam::{DQuat, DVec2, DVec3};
+use std::time::Duration;
 
 /// What is left of the distance after a notch of the wheel, 50 points of scrolling.
 const ZOOM_PER_NOTCH: f64 = 0.8;
@@ -21,6 +22,13 @@ const FASTER: f64 = 4.0;
 /// A surface point stays under the cursor as long as that moves no farther, in pixels.
 const SAME_PLACE_PX: f64 = 6.0;
 
+/// Seconds that a zoom waits for what is under the cursor.
+const LONGEST_SEARCH: f64 = 0.3;
+
+/// Marks of picked points that are known to the leaves' radius only, and of those that lie on the original.
+const UNCERTAIN: Color32 = Color32::from_rgb(255, 170, 60);
+const EXACT: Color32 = Color32::from_rgb(110, 220, 120);
+
 /// Radians that the light turns for each point of a drag.
 const LIGHT_PER_POINT: f64 = 0.01;
 
@@ -28,6 +36,7 @@ impl Viewer {
     /// Keys that work wherever the mouse is, unless something is being typed.
     pub(crate) fn keys(&mut self, ui: &Ui, now: f64) {
         // By the modifiers at the moment of the key: they may be up again by now.
+        self.wants_new_device |= ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::F5));
         self.wants_to_quit |= ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Q));
         if ui.ctx().text_edit_focused() {
             return;
@@ -80,10 +89,16 @@ impl Viewer {
             let held = if input.modifiers.command { DVec3::ZERO } else { by };
             (held * if input.modifiers.shift { FASTER } else { 1.0 }, f64::from(input.stable_dt).min(0.1))
         });
-        if by != DVec3::ZERO {
-            self.steer(&Input::Fly { by: by * (SPEED * seconds) }, now);
-            ui.request_repaint();
+        if by == DVec3::ZERO {
+            self.ahead = None;
+            return;
         }
+        if by.z > 0.0 {
+            let middle = DVec2::new(f64::from(self.size.width), f64::from(self.size.height)) * 0.5;
+            self.pick(Purpose::Ahead, middle);
+        }
+        self.steer(&Input::Fly { by: by * (SPEED * seconds), ahead: self.ahead }, now);
+        ui.request_repaint();
     }
 
     /// The picture's part of the window: drags, wheel, clicks.
@@ -94,14 +109,21 @@ impl Viewer {
             let response = ui.interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag());
             self.mouse(ui, &response);
             self.draw_measurement(ui);
-            if self.models.is_empty() && self.jobs.running().is_empty() && self.folder.is_none() {
-                ui.painter().text(
-                    rect.center(),
-                    Align2::CENTER_CENTER,
-                    "Drop a model, a scene, a folder or a camera path here",
-                    FontId::proportional(22.0),
-                    Color32::from_gray(190),
-                );
+            if self.models.is_empty() || self.figures.frames == 0 {
+                let [r, g, b] = self.settings.background;
+                ui.painter().rect_filled(rect, 0.0, Color32::from_rgb(r, g, b));
+                // Readable on whatever background.
+                let is_dark = u32::from(r) + u32::from(g) + u32::from(b) < 384;
+                let color = Color32::from_gray(if is_dark { 190 } else { 60 });
+                let texts = [
+                    ("Drop a model, a scene, a folder or a camera path here", 22.0, -16.0),
+                    ("or choose one with Open…", 16.0, 16.0),
+                ];
+                let is_busy = !self.jobs.running().is_empty() || self.folder.is_some() || !self.models.is_empty();
+                for (text, size, down) in texts.into_iter().filter(|_| !is_busy) {
+                    let at = rect.center() + egui::vec2(0.0, down);
+                    ui.painter().text(at, Align2::CENTER_CENTER, text, FontId::proportional(size), color);
+                }
             }
         });
     }
@@ -145,14 +167,40 @@ impl Viewer {
         if let Some(at) = response.hover_pos().filter(|_| factor != 1.0) {
             self.zoom(px(at), factor, now);
         }
+        // Who waits too long zooms towards what is as far away as the pivot.
+        if let Some(ZoomToCome { factor, at_px, since }) = self.zoom_to_come {
+            if now - since > LONGEST_SEARCH {
+                self.zoom_to_come = None;
+                self.steer(&Input::Zoom { factor, at_px, surface: None }, now);
+            } else {
+                ui.ctx().request_repaint_after(Duration::from_secs_f64(LONGEST_SEARCH));
+            }
+        }
     }
 
-    fn zoom(&mut self, at_px: DVec2, factor: f64, now: f64) {
-        let known = self.under_cursor.filter(|(place, _)| place.distance(at_px) <= SAME_PLACE_PX);
-        if known.is_none() {
-            self.pick(Purpose::Zoom, at_px);
+    /// Zooms towards what is under the cursor, once that is known.
+    pub(crate) fn zoom(&mut self, at_px: DVec2, factor: f64, now: f64) {
+        let camera = self.camera(&self.own_viewpoint());
+        let is_there = |(place, surface): &(DVec2, Option<Anchor>)| {
+            let at = |surface: &Anchor| camera.pixel_of_view_point(camera.view_point(surface.at));
+            place.distance(at_px) <= SAME_PLACE_PX
+                && surface.is_none_or(|surface| at(&surface).distance(at_px) <= SAME_PLACE_PX)
+        };
+        match self.under_cursor.filter(is_there) {
+            Some((_, surface)) => {
+                self.steer(&Input::Zoom { factor, at_px, surface }, now);
+                if surface.is_none() {
+                    // Something may come under the cursor.
+                    self.pick(Purpose::Zoom, at_px);
+                }
+            }
+            None => {
+                let before = self.zoom_to_come.map_or(1.0, |before| before.factor);
+                let since = self.zoom_to_come.map_or(now, |before| before.since);
+                self.zoom_to_come = Some(ZoomToCome { factor: before * factor, at_px, since });
+                self.pick(Purpose::Zoom, at_px);
+            }
         }
-        self.steer(&Input::Zoom { factor, at_px, surface: known.map(|(_, point)| point) }, now);
     }
 
     /// Turns the light as if it hung on the hand.
@@ -164,18 +212,21 @@ impl Viewer {
         self.settings.towards_light = (turn * light).try_normalize();
     }
 
-    /// Picked points, and the distance between them.
+    /// Picked points, and the distance between them; those that are exact in another colour.
     fn draw_measurement(&mut self, ui: &Ui) {
         let now = ui.input(|input| input.time);
         let viewpoint = self.viewpoint(now);
         let camera = self.camera(&viewpoint);
         let scale = ui.ctx().pixels_per_point();
-        let places: Vec<Pos2> =
-            self.measuring.points().filter_map(|found| place(&camera, found.point, scale)).collect();
-        let color = Color32::from_rgb(255, 170, 60);
+        let color = |uncertain| if uncertain > 0.0 { UNCERTAIN } else { EXACT };
+        let places: Vec<(Pos2, Color32)> = self
+            .measuring
+            .points()
+            .filter_map(|found| Some((place(&camera, found.point, scale)?, color(found.uncertain))))
+            .collect();
         let painter = ui.painter();
-        if let ([a, b], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
-            painter.line_segment([*a, *b], Stroke::new(1.5, color));
+        if let ([(a, _), (b, _)], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
+            painter.line_segment([*a, *b], Stroke::new(1.5, color(uncertain)));
             let middle = *a + (*b - *a) * 0.5;
             let text = digits(distance, uncertain);
             let font = FontId::proportional(15.0);
@@ -184,7 +235,7 @@ impl Viewer {
             painter.rect_filled(at.expand(4.0), 4.0, Color32::from_black_alpha(190));
             painter.galley(at.min, galley, Color32::WHITE);
         }
-        for at in places {
+        for (at, color) in places {
             painter.circle(at, 4.0, color, Stroke::new(1.0, Color32::BLACK));
         }
     }

@@ -24,6 +24,9 @@ use winit::window::{Window, WindowId};
 /// Frames that change nothing come at most so often.
 const LEAST_DELAY: Duration = Duration::from_millis(8);
 
+/// A window that cannot be painted is tried again after so long.
+const TRY_AGAIN: Duration = Duration::from_millis(500);
+
 /// A device that is lost so often in a row stays lost.
 const MOST_LOSSES: u32 = 3;
 
@@ -124,7 +127,8 @@ impl ApplicationHandler<Wake> for App {
             running.ask();
         }
         match event {
-            WindowEvent::CloseRequested => events.exit(),
+            // Destroyed: somebody else has taken it away.
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => events.exit(),
             WindowEvent::Resized(size) => {
                 running.size = ImageSize { width: size.width, height: size.height };
                 running.painter.resize(running.size);
@@ -242,8 +246,11 @@ impl Running {
     fn frame(&mut self) -> Result<Next, ViewError> {
         let begun = thread_cpu_ms();
         self.must_paint |= !std::mem::take(&mut self.asked);
-        if std::mem::take(&mut self.viewer.wants_recovery) {
-            self.recover()?;
+        if std::mem::take(&mut self.viewer.wants_new_device) {
+            self.painter.gpu().close();
+        }
+        if let Some(why) = self.viewer.wants_recovery.take() {
+            self.recover(&why)?;
         }
         let raw = self.input.take_egui_input(&self.window);
         let (viewer, size) = (&mut self.viewer, self.size);
@@ -256,6 +263,7 @@ impl Running {
             && self.painted == Some(picture)
             && self.painted_shapes == output.shapes;
         if is_same {
+            self.mailbox.painted(self.viewer.figures.frames);
             // A person drags, and the stage has not caught up: painting the same again would only take its time.
             let next = Instant::now().checked_add(delay.max(LEAST_DELAY)).map_or(Next::Wait, Next::At);
             return Ok(if self.viewer.wants_to_quit { Next::End } else { next });
@@ -267,16 +275,17 @@ impl Running {
         let ui = UiPaint { primitives: &primitives, pixels_per_point: output.pixels_per_point };
         self.painter.take_textures(&output.textures_delta);
         let painted = self.paint(shown.as_ref(), &ui);
+        self.mailbox.painted(self.viewer.figures.frames);
         self.painter.free_textures(&output.textures_delta);
         output.textures_delta.clear();
         let (painted, driver_ms) = match painted {
-            Err(RenderError::DeviceLost(_)) => {
-                self.recover()?;
+            Err(RenderError::DeviceLost(why)) => {
+                self.recover(&why)?;
                 return Ok(Next::Redraw);
             }
             Err(error) => {
                 self.viewer.notice_error(&error.to_string());
-                return Ok(Next::Redraw);
+                return Ok(Instant::now().checked_add(TRY_AGAIN).map_or(Next::Wait, Next::At));
             }
             Ok(painted) => painted,
         };
@@ -319,7 +328,7 @@ impl Running {
     }
 
     /// Opens the device anew, where it is lost.
-    fn recover(&mut self) -> Result<(), ViewError> {
+    fn recover(&mut self, why: &str) -> Result<(), ViewError> {
         self.must_paint = true;
         if !self.painter.gpu().is_lost() {
             self.mailbox.order(Order::MoveTo(Box::new(self.painter.gpu().clone())));
@@ -329,6 +338,9 @@ impl Running {
         self.mailbox.forget_shown();
         match self.painter.recover() {
             Ok(gpu) => {
+                let now = self.context.input(|input| input.time);
+                self.viewer.adapter = gpu.adapter();
+                self.viewer.notice_mended(&format!("the graphics device was lost and opened anew: {why}"), now);
                 self.mailbox.order(Order::MoveTo(Box::new(gpu)));
                 Ok(())
             }

@@ -241,7 +241,7 @@ pub(crate) struct CameraArgs {
     #[arg(long, value_parser = parse::fov, allow_hyphen_values = true, value_name = "DEG")]
     pub(crate) fov: Option<f64>,
     /// Around the model's middle: azimuth (0 is the front, growing to the right), elevation (growing upwards), both in degrees,
-    /// and how many times nearer than a view of the whole [default: 0,0,1]
+    /// and how many times nearer than a view of the whole [default: 0,0,1, or 0,35,1 for what lies flat, as terrain]
     #[arg(long, value_parser = parse::orbit, allow_hyphen_values = true, value_name = "AZ,EL[,ZOOM]",
         conflicts_with_all = ["eye", "path"])]
     pub(crate) orbit: Option<[f64; 3]>,

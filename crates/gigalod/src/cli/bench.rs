@@ -35,8 +35,12 @@ struct FrameFigures {
     points: u64,
     /// What the cut was made at.
     threshold_px: f32,
+    /// Pixels of the screen that a drawn one is wide.
+    pixel_edge_px: f64,
     /// Null where something reaches the eye itself.
     max_error_px: Option<f32>,
+    /// False where the camera rests.
+    moved: bool,
     /// Pages that it could have used and that were not resident.
     page_misses: u64,
 }
@@ -47,7 +51,8 @@ struct Summary {
     frame_ms_median: f64,
     frame_ms_p95: f64,
     frame_ms_max: f64,
-    /// Frames that were coarser than --error asks for, so that the time they took was a choice; null without --target-ms.
+    /// Frames of a moving camera that were coarser than --error and --size ask for, so that the time they took was a choice; null
+    /// without --target-ms.
     paced: Option<Paced>,
     /// What came after the path's end; null without --target-ms.
     rest: Option<Rest>,
@@ -107,7 +112,7 @@ impl Run<'_> {
         work.begin("draw", self.path.frames.len() as u64);
         let wanted = Fineness::px(self.args.draw.threshold_px() as f32);
         for index in 0..self.path.frames.len() {
-            self.frame(self.path.frames[index].t, &wanted)?;
+            self.frame(self.path.frames[index].t, &wanted, true)?;
             work.at(index as u64 + 1);
         }
         Ok(self.frames.len())
@@ -118,7 +123,8 @@ impl Run<'_> {
         let work = self.console.work("bench");
         let (first, last) = (self.path.frames[0].t, self.path.frames[self.path.frames.len() - 1].t);
         work.begin("play", ((last - first) * 1e3) as u64);
-        let mut control = FrameRate::new(target_ms, self.args.draw.threshold_px() as f32);
+        let control = FrameRate::new(target_ms, self.args.draw.threshold_px() as f32).with_larger_pixels();
+        self.stage.control = Some(control);
         let begun = Instant::now();
         let mut before = None;
         loop {
@@ -131,26 +137,32 @@ impl Run<'_> {
             if first + elapsed >= last {
                 break;
             }
-            self.paced_frame(t, moved, &mut control)?;
+            self.paced_frame(t, moved)?;
         }
         let on_path = self.frames.len();
         let mut moved = true;
-        while !control.is_settled() {
-            self.paced_frame(first + begun.elapsed().as_secs_f64(), moved, &mut control)?;
+        while !self.control().is_settled() {
+            self.paced_frame(first + begun.elapsed().as_secs_f64(), moved)?;
             moved = false;
         }
         Ok(on_path)
     }
 
-    fn paced_frame(&mut self, t: f64, moved: bool, control: &mut FrameRate) -> Result<(), CliError> {
-        self.frame(t, &control.next(moved))?;
-        let drawn = self.frames.last().expect("a frame was just drawn");
-        control.drew(drawn.frame_ms, &self.last, self.stage.scene.residency().is_loading());
+    fn paced_frame(&mut self, t: f64, moved: bool) -> Result<(), CliError> {
+        let wanted = self.control().next(moved);
+        self.frame(t, &wanted, moved)?;
+        let (frame_ms, report) = (self.frames.last().expect("a frame was just drawn").frame_ms, self.last);
+        let loading = self.stage.scene.residency().is_loading();
+        self.control().drew(frame_ms, &report, loading);
         Ok(())
     }
 
+    fn control(&mut self) -> &mut FrameRate {
+        self.stage.control.as_mut().expect("the path is played in real time")
+    }
+
     /// One frame of what is resident now.
-    fn frame(&mut self, t: f64, wanted: &Fineness) -> Result<(), CliError> {
+    fn frame(&mut self, t: f64, wanted: &Fineness, moved: bool) -> Result<(), CliError> {
         let pose = self.path.at(t);
         let fov = self.args.fov.unwrap_or(self.path.fov_deg).to_radians();
         let camera = Camera::look_at(pose.eye, pose.target, self.path.up, fov, self.args.draw.size);
@@ -167,7 +179,9 @@ impl Run<'_> {
             triangles: 0,
             points: self.last.drawn,
             threshold_px: self.last.threshold_px,
+            pixel_edge_px: drawn.pixel_edge_px,
             max_error_px: self.last.max_error_px.is_finite().then_some(self.last.max_error_px),
+            moved,
             page_misses,
         });
         Ok(())
@@ -184,7 +198,9 @@ fn summary(frames: &[FrameFigures], on_path: usize, args: &BenchArgs) -> Summary
     };
     let all = sorted(&mut if path.is_empty() { rest } else { path }.iter());
     let finest_px = args.draw.threshold_px() as f32;
-    let paced = sorted(&mut path.iter().filter(|frame| frame.threshold_px > finest_px));
+    let coarser = |frame: &&FrameFigures| frame.threshold_px > finest_px || frame.pixel_edge_px > 1.0;
+    // Where there is nothing to draw, nothing makes a frame longer.
+    let paced = sorted(&mut path.iter().filter(|frame| frame.moved && frame.points > 0).filter(coarser));
     let thresholds: Vec<f32> = rest.iter().map(|frame| frame.threshold_px).collect();
     let steps: Vec<f32> = thresholds.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step != 0.0).collect();
     let of = |part: f64| percentile(&all, part).unwrap_or(0.0);
@@ -200,7 +216,8 @@ fn summary(frames: &[FrameFigures], on_path: usize, args: &BenchArgs) -> Summary
         }),
         rest: args.target_ms.map(|_| Rest {
             frames: rest.len(),
-            seconds: rest.iter().map(|frame| frame.frame_ms).sum::<f64>() / 1e3,
+            // An empty sum is -0.
+            seconds: rest.iter().map(|frame| frame.frame_ms).sum::<f64>().max(0.0) / 1e3,
             threshold_px: thresholds.last().copied().unwrap_or(finest_px),
             sign_changes: steps.windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count(),
         }),
@@ -224,10 +241,11 @@ fn describe(path: &[FrameFigures], summary: &Summary, args: &BenchArgs) -> Strin
     let mean = |of: fn(&FrameFigures) -> f64| path.iter().map(of).sum::<f64>() / path.len().max(1) as f64;
     let _ = writeln!(
         text,
-        "on average {:.0} splats, {:.1} ms to select them, {:.2} px",
+        "on average {:.0} splats, {:.1} ms to select them, {:.2} px; pixels {:.2} px wide",
         mean(|frame| frame.points as f64),
         mean(|frame| frame.select_ms),
         mean(|frame| f64::from(frame.threshold_px)),
+        mean(|frame| frame.pixel_edge_px),
     );
     if let (Some(target_ms), Some(paced)) = (args.target_ms, &summary.paced)
         && let (Some(low), Some(median), Some(high)) = (paced.frame_ms_p05, paced.frame_ms_median, paced.frame_ms_p95)

@@ -65,6 +65,42 @@ pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u6
     Ok(Found::NotBuilt(cached))
 }
 
+/// Notes what a file is built as, so that [`was_built`] need not read it. Where that cannot be noted, nothing depends on it.
+#[cfg(feature = "view")]
+pub(crate) fn note_place(file: &Path, cached: &Path) {
+    let _ = folder().ok().and_then(|folder| note_place_in(&folder, file, cached));
+}
+
+/// True where a file was remembered, has not been written to since, and what it builds into is there. Told by its name and stamp: good
+/// enough for a list.
+#[cfg(feature = "view")]
+pub(crate) fn was_built(file: &Path) -> bool {
+    folder().is_ok_and(|folder| was_built_in(&folder, file))
+}
+
+#[cfg(feature = "view")]
+fn note_place_in(folder: &Path, file: &Path, cached: &Path) -> Option<()> {
+    let note = note_of(folder, file)?;
+    std::fs::create_dir_all(note.parent()?).ok()?;
+    std::fs::write(note, cached.file_name()?.as_encoded_bytes()).ok()
+}
+
+#[cfg(feature = "view")]
+fn was_built_in(folder: &Path, file: &Path) -> bool {
+    let cached = note_of(folder, file).and_then(|note| std::fs::read_to_string(note).ok());
+    cached.is_some_and(|name| folder.join(name).is_file())
+}
+
+/// Where it is noted what a file is built as.
+#[cfg(feature = "view")]
+fn note_of(folder: &Path, file: &Path) -> Option<PathBuf> {
+    let stamp = files::stamp(&files::open(file).ok()?).ok()?;
+    let path = file.canonicalize().ok()?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(path.as_os_str().as_encoded_bytes()).update(format!("{stamp:?}").as_bytes());
+    Some(folder.join("seen").join(&hasher.finalize().to_hex()[..32]))
+}
+
 /// The list beside a built file.
 fn list_of(cached: &Path) -> PathBuf {
     cached.with_extension("files.json")
@@ -135,5 +171,29 @@ fn key(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u64) -> bool) 
         }
         hasher.update(&buffer[..read]);
         done += read as u64;
+    }
+}
+
+#[cfg(all(test, feature = "view"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_built_is_known_until_it_is_written_to_or_its_model_is_gone() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        let (raw, other, built) = (place("scan.ply"), place("other.ply"), place("0123.glod"));
+        for (name, contents) in [(&raw, "one"), (&other, "one"), (&built, "built")] {
+            std::fs::write(name, contents).unwrap();
+        }
+        assert!(!was_built_in(folder.path(), &raw));
+        note_place_in(folder.path(), &raw, &built).unwrap();
+        assert!(was_built_in(folder.path(), &raw) && !was_built_in(folder.path(), &other));
+        std::fs::write(&raw, "longer").unwrap();
+        assert!(!was_built_in(folder.path(), &raw));
+        note_place_in(folder.path(), &raw, &built).unwrap();
+        assert!(was_built_in(folder.path(), &raw));
+        std::fs::remove_file(&built).unwrap();
+        assert!(!was_built_in(folder.path(), &raw));
     }
 }

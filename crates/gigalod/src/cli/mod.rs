@@ -26,6 +26,10 @@ mod verify;
 mod view;
 #[cfg(feature = "view")]
 mod view_files;
+#[cfg(feature = "view")]
+mod view_folder;
+#[cfg(feature = "view")]
+mod view_preview;
 
 use args::{Cli, Command};
 use clap::Parser;

@@ -7,7 +7,7 @@ use super::path_file;
 use super::progress::Console;
 use super::stage::{Drawn, Stage, Wait};
 use super::subject::Subject;
-use gigalod_geom::camera::DEFAULT_FOV_DEG;
+use gigalod_geom::camera::{DEFAULT_FOV_DEG, default_orbit_deg};
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use gigalod_render::{Look, Picture, Renderer};
 use gigalod_runtime::splats::Tint;
@@ -89,7 +89,7 @@ impl Stage {
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
         self.scene.splats_mut().tint = job.tint;
         let wanted = Fineness::px(job.threshold_px as f32);
-        let Drawn { report, select_ms, frame_ms, what: picture } =
+        let Drawn { report, select_ms, frame_ms, what: picture, .. } =
             self.draw_until(&job.camera, job.look, &wanted, Wait::Converged, Renderer::picture, console)?;
 
         files::write_png(job.output, picture.size, &picture.rgba)?;
@@ -170,7 +170,10 @@ fn camera(args: &CameraArgs, size: ImageSize, bounds: &Aabb, subject: &Subject) 
         return Ok(Camera::look_at(pose.eye, pose.target, camera_path.up, fov, size));
     }
     let fov = fov_rad(args.fov.or(scene.fov_deg));
-    let [azimuth, elevation, zoom] = args.orbit.unwrap_or([0.0, 0.0, 1.0]);
+    let [azimuth, elevation, zoom] = args.orbit.unwrap_or_else(|| {
+        let [azimuth, elevation] = default_orbit_deg(bounds, up);
+        [azimuth, elevation, 1.0]
+    });
     let whole = Camera::orbit(bounds, up, [azimuth, elevation], zoom, fov, size);
     if args.orbit.is_some() || scene.eye.is_none() && scene.target.is_none() {
         return Ok(whole);

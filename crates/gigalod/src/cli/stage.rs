@@ -10,7 +10,7 @@ use gigalod_render::{Frame, Gpu, Lighting, Look, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::scene::description::SceneDescription;
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, FileId, Fineness, Instance, Residency, Scene, ViewId};
+use gigalod_runtime::{CutReport, FileId, Fineness, FrameRate, Instance, Magnified, Residency, Scene, ViewId};
 use std::path::Path;
 use std::time::Instant;
 
@@ -27,6 +27,8 @@ const FEWEST_SPLATS: u64 = 1000;
 pub(crate) struct Stage {
     pub(crate) scene: Scene,
     pub(crate) renderer: Renderer,
+    /// Draws larger pixels where full ones would be late.
+    pub(crate) control: Option<FrameRate>,
     up: UpAxis,
     /// What a device without enough memory has left.
     most_splats: u64,
@@ -53,7 +55,10 @@ pub(crate) enum Wait {
 
 /// A frame that was drawn; times on the clock, from the beginning of its last cut.
 pub(crate) struct Drawn<T> {
+    /// What is on the screen.
     pub(crate) report: CutReport,
+    /// Pixels of the screen that a drawn one is wide.
+    pub(crate) pixel_edge_px: f64,
     pub(crate) select_ms: f64,
     pub(crate) frame_ms: f64,
     pub(crate) what: T,
@@ -77,7 +82,7 @@ impl Stage {
         }
         let mut renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
         renderer.set_budget(budgets.gpu);
-        Ok(Self { scene, renderer, up, most_splats: u64::MAX, happened: Vec::new() })
+        Ok(Self { scene, renderer, control: None, up, most_splats: u64::MAX, happened: Vec::new() })
     }
 
     /// Around all models.
@@ -114,12 +119,17 @@ impl Stage {
             self.scene.residency_mut().receive(false);
             let report = self.scene.select(CAMERA, camera, &fineness);
             let select_ms = begun.elapsed().as_secs_f64() * 1e3;
+            let pixel_edge_px = match &mut self.control {
+                Some(control) => control.pixel_edge_px(&report, select_ms, self.scene.area_px(CAMERA, camera)),
+                None => 1.0,
+            };
+            let shown = Magnified::new(camera, pixel_edge_px);
             let draws =
                 self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-            match draw(&mut self.renderer, &Frame { camera: *camera, look, draws }) {
+            match draw(&mut self.renderer, &Frame { camera: *shown.camera(), look, draws }) {
                 Ok(what) => {
                     let frame_ms = begun.elapsed().as_secs_f64() * 1e3;
-                    return Ok(Drawn { report, select_ms, frame_ms, what });
+                    return Ok(Drawn { report: shown.report(&report), pixel_edge_px, select_ms, frame_ms, what });
                 }
                 Err(RenderError::DeviceLost(why)) if losses < MOST_LOSSES => {
                     losses += 1;

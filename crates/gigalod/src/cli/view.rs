@@ -76,7 +76,7 @@ pub(crate) fn run(args: &ViewArgs, _console: &Console) -> Result<Outcome, CliErr
             fov_deg = fov_deg.or(Some(camera_path.fov_deg));
             FirstLook::From { eye: pose.eye, target: pose.target }
         }
-        _ => FirstLook::Orbit(args.camera.orbit.unwrap_or([0.0, 0.0, 1.0])),
+        _ => args.camera.orbit.map_or(FirstLook::Whole, FirstLook::Orbit),
     };
     let look = args.draw.look(&Default::default());
     let options = Options {

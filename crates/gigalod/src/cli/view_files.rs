@@ -10,21 +10,20 @@ use super::exact;
 use super::files;
 use super::path_file;
 use super::scene_file;
+use super::view_preview::Extent;
+use super::{view_folder, view_preview};
 use gigalod_geom::{CameraPath, ImageSize};
 use gigalod_runtime::Similarity;
 use gigalod_runtime::scene::description::SceneDescription;
 use gigalod_view::pick::{Hit, Ray};
-use gigalod_view::{Host, Model, Opened, OpenedScene, Work};
+use gigalod_view::{Host, Model, Opened, OpenedScene, Preview, Work};
 use glam::DVec3;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// Names of models end in one of these, and perhaps in `.gz`.
-const ENDINGS: [&str; 15] =
-    ["glod", "toml", "ply", "obj", "stl", "off", "gltf", "glb", "las", "laz", "e57", "pcd", "pts", "xyz", "txt"];
 
 /// How often a build is asked whether it is done.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -71,7 +70,7 @@ fn told(error: CliError) -> String {
 impl Files {
     fn open_any(&self, path: &Path, work: &Work) -> Result<Opened, CliError> {
         if path.is_dir() {
-            return models_of(path).map(Opened::Folder);
+            return view_folder::list(path).map(Opened::Folder);
         }
         if scene_file::is_scene(path) {
             let description = scene_file::read(path)?;
@@ -89,19 +88,50 @@ impl Files {
 
     fn model(&self, path: &Path, placements: Vec<Similarity>, work: &Work) -> Result<Model, CliError> {
         let mut at = |done: u64, total: u64| {
-            work.at("reading", Some(done as f32 / total.max(1) as f32));
+            work.at("looked up", Some(done as f32 / total.max(1) as f32), None);
             !work.is_cancelled()
         };
-        let (container, original) = match cache::find(path, None, &mut at)? {
+        let (container, original) = match cache::find(path, self.build.spacing, &mut at)? {
             Found::Itself => (path.to_owned(), None),
             Found::Built(cached) => (cached, Some(path.to_owned())),
             Found::NotBuilt(cached) => {
-                self.build(path, &cached, work)?;
+                self.build_with_preview(path, &cached, &placements, work)?;
                 (cached, Some(path.to_owned()))
             }
         };
+        if original.is_some() {
+            cache::note_place(path, &container);
+        }
         let file = Arc::new(files::open_splats(&container)?);
         Ok(Model { source: path.to_owned(), file, original, placements })
+    }
+
+    /// Builds a raw model, and shows what can be had of it sooner.
+    fn build_with_preview(
+        &self,
+        path: &Path,
+        output: &Path,
+        placements: &[Similarity],
+        work: &Work,
+    ) -> Result<(), CliError> {
+        let is_built = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let preview = scope.spawn(|| {
+                let is_late = || work.is_cancelled() || is_built.load(Ordering::Relaxed);
+                // What is wrong with the file is told by the build.
+                if let Ok(Some((file, points))) = view_preview::of(path, Extent::USUAL, &is_late)
+                    && !is_late()
+                {
+                    let (source, placements) = (path.to_owned(), placements.to_vec());
+                    let model = Model { source, file: Arc::new(file), original: None, placements };
+                    work.preview(Preview { model, points });
+                }
+            });
+            let built = self.build(path, output, work);
+            is_built.store(true, Ordering::Relaxed);
+            let _ = preview.join();
+            built
+        })
     }
 
     /// Builds a raw model in another process; what a cancelled build has finished is continued the next time.
@@ -112,6 +142,7 @@ impl Files {
         let mut child = Command::new(std::env::current_exe().map_err(wrong)?)
             .args(["build", "--verbose", "--resume"])
             .args(["--memory", &self.build.memory.to_string(), "--threads", &self.build.threads.to_string()])
+            .args(self.build.spacing.iter().flat_map(|spacing| ["--spacing".to_string(), spacing.to_string()]))
             .arg("--output")
             .arg(output)
             .arg(input_name)
@@ -127,8 +158,8 @@ impl Files {
             for line in lines.into_iter().flat_map(|lines| BufReader::new(lines).lines()).map_while(Result::ok) {
                 match line.strip_prefix(&format!("{name}: ")) {
                     Some(step) => {
-                        let (phase, part) = phase_of(step);
-                        progress.at(phase, part);
+                        let (phase, part, left) = phase_of(step);
+                        progress.at(phase, part, left);
                     }
                     None if line.starts_with("error: ") || line.starts_with("hint: ") => errors.push(line),
                     None => {}
@@ -174,28 +205,15 @@ fn stop(child: &mut Child) {
     let _ = child.wait();
 }
 
-/// `read 12 %, 3 s left` → what is done, and how much of it.
-fn phase_of(step: &str) -> (&str, Option<f32>) {
-    let percent = step.split_once(" %").and_then(|(before, _)| before.rsplit_once(' '));
-    match percent.and_then(|(phase, number)| Some((phase, number.parse::<f32>().ok()?))) {
-        Some((phase, percent)) => (phase, Some(percent / 100.0)),
-        None => (step, None),
-    }
-}
-
-/// Models and scenes of a folder, by name.
-fn models_of(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
-    let entries = std::fs::read_dir(folder).map_err(|error| CliError::in_file(folder, error))?;
-    let mut found: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(|path| is_model(path)).collect();
-    found.sort();
-    Ok(found)
-}
-
-fn is_model(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);
-    ENDINGS.contains(&ending) && !name.starts_with('.') && path.is_file()
+/// `read 12 %, 3 s left` → what is done, how much of it, and how long it still takes.
+fn phase_of(step: &str) -> (&str, Option<f32>, Option<Duration>) {
+    let read = || {
+        let (before, after) = step.split_once(" %")?;
+        let (phase, percent) = before.rsplit_once(' ')?;
+        let left = after.strip_prefix(", ").and_then(|left| left.strip_suffix(" s left")?.parse().ok());
+        Some((phase, Some(percent.parse::<f32>().ok()? / 100.0), left.map(Duration::from_secs)))
+    };
+    read().unwrap_or((step, None, None))
 }
 
 #[cfg(test)]
@@ -204,23 +222,9 @@ mod tests {
 
     #[test]
     fn lines_of_a_build_say_how_far_it_is() {
-        assert_eq!(phase_of("read 12 %, 3 s left"), ("read", Some(0.12)));
-        assert_eq!(phase_of("sort runs 100 %, 0 s left"), ("sort runs", Some(1.0)));
-        assert_eq!(phase_of("write"), ("write", None));
-    }
-
-    #[test]
-    fn a_folder_lists_what_can_be_shown() {
-        let folder = tempfile::tempdir().unwrap();
-        for name in ["b.ply.gz", "a.GLOD", "scene.toml", "notes.md", ".hidden.ply", "c.laz"] {
-            std::fs::write(folder.path().join(name), "").unwrap();
-        }
-        std::fs::create_dir(folder.path().join("d.ply")).unwrap();
-        let names: Vec<String> = models_of(folder.path())
-            .unwrap()
-            .iter()
-            .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
-            .collect();
-        assert_eq!(names, ["a.GLOD", "b.ply.gz", "c.laz", "scene.toml"]);
+        let seconds = |seconds| Some(Duration::from_secs(seconds));
+        assert_eq!(phase_of("read 12 %, 3 s left"), ("read", Some(0.12), seconds(3)));
+        assert_eq!(phase_of("sort runs 100 %, 0 s left"), ("sort runs", Some(1.0), seconds(0)));
+        assert_eq!(phase_of("write"), ("write", None, None));
     }
 }

@@ -11,6 +11,7 @@
 // CPU twin: `gigalod_reference::shade`.
 
 #import light_params.wgsl
+#import dot.wgsl
 
 @group(0) @binding(0) var<uniform> params: LightParams;
 @group(0) @binding(1) var albedo_texture: texture_2d<f32>;
@@ -34,11 +35,15 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let from_middle = position.xy - params.size_px * 0.5;
     let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) * (1.0 / params.focal_px);
     let stored = textureLoad(normal_texture, pixel, 0).xyz;
-    let away = dot(stored, ray) > GRAZING * length(ray) * length(stored);
+    // Compared as squares: without roots.
+    let along = dot3(stored, ray);
+    let away = along > 0.0 && along * along > GRAZING * GRAZING * dot3(ray, ray) * dot3(stored, stored);
     // Where normals cancelled out, the surface faces the eye.
     let turned = select(stored, -stored, away);
-    let normal = normalize(select(-ray, turned, dot(turned, turned) > 1e-8));
-    let direct = (1.0 - params.ambient) * max(dot(normal, params.towards_light.xyz), 0.0);
+    let faced = select(-ray, turned, dot3(turned, turned) > 1e-8);
+    // Not `normalize`, which compilers spell in different ways, and round so.
+    let normal = faced * inverseSqrt(dot3(faced, faced));
+    let direct = (1.0 - params.ambient) * max(dot3(normal, params.towards_light.xyz), 0.0);
     let lit = albedo.rgb * params.light.rgb * (params.ambient + direct);
     return vec4f(params.background.rgb * (1.0 - albedo.a) + lit * albedo.a, 1.0);
 }

@@ -13,6 +13,7 @@
 @group(0) @binding(4) var<storage, read> keys: array<vec2u>;
 @group(0) @binding(5) var<storage, read> sums: array<u32>;
 
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_surface.wgsl

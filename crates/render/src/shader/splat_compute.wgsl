@@ -1,6 +1,6 @@
 // splat_compute.wgsl: draws small splats into the keys of a band, and lists the large ones.
 //
-// Dispatch  the splats of one part, EACH an invocation, in rows of ROW workgroups.
+// Dispatch  the splats of one part, up to EACH an invocation, in rows of ROW workgroups.
 // Reads     frame, part; balls; normals and colours where the kernel needs them.
 // Writes    keys (and sums); list of large splats and how many there are (`DrawIndirectArgs`).
 // Limits    none beyond the baseline of WebGPU with 32-bit keys; 64-bit ones need `SHADER_INT64_ATOMIC_MIN_MAX`.
@@ -24,6 +24,7 @@ var<private> frame: PassParams;
 var<private> part: PartParams;
 
 #import splat_store.wgsl
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_target.wgsl
@@ -34,23 +35,42 @@ const ROW: u32 = 32768u;
 const GROUP: u32 = 64u;
 const EACH: u32 = 16u;
 
+// 0: all splats. 1: every FEW-th. 2: the others.
+override round: u32 = 0u;
+const FEW: u32 = 4u;
+
+// How many of its splats an invocation draws in this round, and which of its workgroup's are drawn, counted through.
+fn turns() -> u32 {
+    if round == 0u {
+        return EACH;
+    }
+    return select(EACH - EACH / FEW, EACH / FEW, round == 1u);
+}
+
+fn drawn_in_round(index: u32) -> u32 {
+    if round == 0u {
+        return index;
+    }
+    return select(index + index / (FEW - 1u) + 1u, index * FEW, round == 1u);
+}
+
 @compute @workgroup_size(GROUP)
 fn draw_small(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) member: u32) {
     frame = frame_params;
     part = part_params;
     // Neighbours in memory are drawn by neighbours in the workgroup.
-    let first = (group.y * ROW + group.x) * (GROUP * EACH) + member;
+    let first = (group.y * ROW + group.x) * (GROUP * EACH);
     // A bit for each large one. They are listed together, because a processor that runs invocations in lockstep takes its time
     // for each atomic operation, whether or not any of them gets there.
     var large = 0u;
-    for (var turn = 0u; turn < EACH; turn++) {
-        let place = first + turn * GROUP;
+    for (var turn = 0u; turn < turns(); turn++) {
+        let place = first + drawn_in_round(turn * GROUP + member);
         if place < part.count && !draw_if_small(place) {
             large |= 1u << turn;
         }
     }
     while large != 0u {
-        let place = first + countTrailingZeros(large) * GROUP;
+        let place = first + drawn_in_round(countTrailingZeros(large) * GROUP + member);
         large &= large - 1u;
         // There is room for all.
         list[atomicAdd(&draw.instance_count, 1u)] = part.first_slot + place;

@@ -12,6 +12,7 @@
 @group(0) @binding(1) var<uniform> part: PartParams;
 
 #import splat_store.wgsl
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_surface.wgsl
 

@@ -30,7 +30,8 @@ fn splat_of(part: PartParams, ball: vec4f, normal_color: u32, number: u32) -> Sp
     if blends() {
         out.albedo = color_of(normal_color >> 16u);
         let normal = normal_of(normal_color & 0x3fffu);
-        let away = dot(normal, ball.xyz) > GRAZING_TURN * length(ball.xyz);
+        let along = dot3(normal, ball.xyz);
+        let away = along > 0.0 && along * along > GRAZING_TURN * GRAZING_TURN * dot3(ball.xyz, ball.xyz);
         let turned = select(normal, -normal, away);
         out.normal = part.model_x.xyz * turned.x + part.model_y.xyz * turned.y + part.model_z.xyz * turned.z;
     }

@@ -12,6 +12,7 @@
 @group(0) @binding(8) var<storage, read> parts: array<PartParams>;
 
 #import splat_store.wgsl
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_target.wgsl

@@ -17,8 +17,11 @@
 
 // True where there are several parts to tell apart: rare, and slow on some devices.
 override many_parts: bool = true;
+// True where extents of splats are wanted too.
+override wants_footprint: bool = true;
 
 #import splat_store.wgsl
+#import dot.wgsl
 #import splat_shape.wgsl
 #import splat_nearness.wgsl
 #import splat_parts.wgsl
@@ -42,12 +45,12 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     if many_parts {
         let found = part_of_slot(slot);
         normal = normal_in_world(parts[found], normal_code);
-        if frame.wants_footprint == 1u {
+        if wants_footprint {
             footprint_px = footprint_of(shape_of(parts[found], ball_at(slot), normal_code));
         }
     } else {
         normal = normal_in_world(part, normal_code);
-        if frame.wants_footprint == 1u {
+        if wants_footprint {
             footprint_px = footprint_of(shape_of(part, ball_at(slot), normal_code));
         }
     }

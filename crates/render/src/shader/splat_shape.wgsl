@@ -10,6 +10,7 @@
 // |n·v| of their width, at least a tenth and at least one pixel. What is asked of a pixel is asked of where it lay before.
 //
 // Quotients are products with the inverse everywhere: some compilers make them so and others not, and the pictures shall be the same.
+// For the same reason scalar products are those of dot.wgsl.
 //
 // The depth is that of the ball's front. A ball that covers a surface point is therefore never drawn behind it.
 
@@ -61,9 +62,9 @@ fn is_elliptical() -> bool {
 // Centre of a ball in view space.
 fn in_view(part: PartParams, center_in_eye: vec3f) -> vec3f {
     return vec3f(
-        dot(center_in_eye, part.right.xyz),
-        dot(center_in_eye, part.up.xyz),
-        dot(center_in_eye, part.forward.xyz),
+        dot3(center_in_eye, part.right.xyz),
+        dot3(center_in_eye, part.up.xyz),
+        dot3(center_in_eye, part.forward.xyz),
     );
 }
 
@@ -97,17 +98,17 @@ fn shape_of(part: PartParams, ball: vec4f, normal_code: u32) -> Shape {
     }
     let to_px = frame.focal_px * (1.0 / ((c.z - end) * (c.z + end)));
     out.middle_px = frame.size_px * 0.5 + vec2f(c.x, -c.y) * (to_px * c.z);
-    out.half_px = to_px * end * sqrt(max(dot(c, c) - end * end, 0.0)) + slack_px;
+    out.half_px = to_px * end * sqrt(max(dot3(c, c) - end * end, 0.0)) + slack_px;
     var extent = vec2f(out.half_px);
     if is_elliptical() {
         let n = normal_of(normal_code);
-        let facing = abs(dot(n, ball.xyz)) * inverseSqrt(max(dot(ball.xyz, ball.xyz), 1e-30));
+        let facing = abs(dot3(n, ball.xyz)) * inverseSqrt(max(dot3(ball.xyz, ball.xyz), 1e-30));
         let nominal_px = select(out.half_px, out.half_px * 0.5, is_gauss());
         let ratio = min(max(max(facing, LEAST_RATIO), 0.5 * (1.0 / nominal_px)), 1.0);
         // How the projection moves along the normal.
         let n_view = in_view(part, n);
         let along = vec2f(n_view.x * c.z - c.x * n_view.z, c.y * n_view.z - n_view.y * c.z);
-        let length_squared = dot(along, along);
+        let length_squared = dot2(along, along);
         if length_squared > 0.0 {
             out.axis = along * inverseSqrt(length_squared);
             out.stretch = 1.0 / ratio;
@@ -138,8 +139,8 @@ fn slope_at(position_px: vec2f) -> vec2f {
 fn apart_squared(shape: Shape, position_px: vec2f) -> f32 {
     let slope = slope_at(position_px);
     let aside = slope * shape.center.z - shape.center.xy;
-    let along = dot(aside, slope);
-    return dot(aside, aside) - along * along * (1.0 / (1.0 + dot(slope, slope)));
+    let along = dot2(aside, slope);
+    return dot2(aside, aside) - along * along * (1.0 / (1.0 + dot2(slope, slope)));
 }
 
 // A pixel of the splat's window.
@@ -150,17 +151,17 @@ fn meet(shape: Shape, pixel: vec2i) -> Meeting {
     let slope = slope_at(position_px);
     // Where the ray passes the centre, at the centre's depth.
     let aside = slope * c.z - c.xy;
-    let stretch = 1.0 + dot(slope, slope);
+    let stretch = 1.0 + dot2(slope, slope);
     let per_stretch = 1.0 / stretch;
-    let along = dot(aside, slope);
-    let apart = dot(aside, aside) - along * along * per_stretch;
+    let along = dot2(aside, slope);
+    let apart = dot2(aside, aside) - along * along * per_stretch;
 
     var out: Meeting;
     var shape_apart = apart;
     out.covered = true;
     if is_elliptical() {
         let offset = position_px - shape.middle_px;
-        let before = offset + shape.axis * (dot(offset, shape.axis) * (shape.stretch - 1.0));
+        let before = offset + shape.axis * (dot2(offset, shape.axis) * (shape.stretch - 1.0));
         if is_square() {
             out.covered = max(abs(before.x), abs(before.y)) <= shape.half_px;
         } else {
@@ -190,7 +191,7 @@ fn footprint_of(shape: Shape) -> f32 {
         return most;
     }
     let per_gap = 1.0 / ((c.z - end) * (c.z + end));
-    let half_px = frame.focal_px * end * sqrt(max(dot(c, c) - end * end, 0.0)) * per_gap;
+    let half_px = frame.focal_px * end * sqrt(max(dot3(c, c) - end * end, 0.0)) * per_gap;
     // A square's diagonal is √2 times its side.
     return min(half_px * select(2.0, 2.828427, is_square()), most);
 }
@@ -219,7 +220,7 @@ fn normal_of(code: u32) -> vec3f {
     let cell = vec2f(vec2u(code - row * 52u, row - face * 52u));
     let slopes = tangent(0.7853981634 * ((cell * 2.0 + 1.0) * (1.0 / 52.0) - 1.0));
     let axis = face >> 1u;
-    let major = inverseSqrt(1.0 + dot(slopes, slopes));
+    let major = inverseSqrt(1.0 + dot2(slopes, slopes));
     let minor = slopes * major;
     let signed = select(major, -major, (face & 1u) == 1u);
     return select(

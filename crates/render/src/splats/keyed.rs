@@ -10,10 +10,11 @@
 use crate::Gpu;
 use crate::gbuffer::{self, GBuffer};
 use crate::memory::Pool;
-use crate::shader::{self, Target};
+use crate::shader::Target;
+use crate::splats::Kernel;
 use crate::splats::params::{PartParams, PassParams, STRIDE};
+use crate::splats::pipelines::{Pipelines, Resolving, Round, target};
 use crate::splats::store::{self, Chunk, Plan};
-use crate::splats::{BLEND, COMPUTE, Kernel, QUADS, RESOLVE};
 use gigalod_geom::{Camera, ImageSize};
 use std::collections::BTreeMap;
 
@@ -116,25 +117,17 @@ impl KeyedBuffers {
     }
 }
 
-/// The passes of a kernel.
-#[derive(Debug)]
-struct Pipelines {
-    compute: wgpu::ComputePipeline,
-    quads: wgpu::RenderPipeline,
-    resolve: wgpu::RenderPipeline,
-    layouts: [wgpu::BindGroupLayout; 3],
-}
-
 /// Draws splats through keys.
 #[derive(Debug, Default)]
 pub(crate) struct KeyedPass {
-    /// By kernel, and whether chunks have several parts.
-    pipelines: BTreeMap<(Kernel, bool), Pipelines>,
+    pipelines: BTreeMap<Kernel, Pipelines>,
 }
 
 /// What a frame draws with.
 pub(crate) struct KeyedFrame<'a> {
     pub(crate) kernel: Kernel,
+    pub(crate) rounds: &'a [Round],
+    pub(crate) resolving: Resolving,
     pub(crate) bands: Bands,
     pub(crate) plan: &'a Plan,
     pub(crate) chunks: &'a [Chunk],
@@ -148,12 +141,22 @@ fn phases(gpu: &Gpu, kernel: Kernel) -> u32 {
     if target(gpu, kernel) == Target::Keys64 { 1 } else { 2 }
 }
 
-fn target(gpu: &Gpu, kernel: Kernel) -> Target {
-    match (kernel.is_gauss(), gpu.has_wide_keys()) {
-        (true, _) => Target::Sums,
-        (false, true) => Target::Keys64,
-        (false, false) => Target::Keys32,
-    }
+/// Splats over each pixel, in the mean over the picture, from which on it pays to draw a few first. Measured on the software adapter.
+const DEEP: f64 = 4.0;
+
+/// In which rounds small splats are drawn; `area_px` is the area of all splats together. An atomic maximum costs the software
+/// adapter ten times what a look at a texture does. So where many splats lie over each other, a few of them are drawn first, and
+/// then most of the others are seen to be hidden. What is shown is the same: a key that is smaller than one already there changes
+/// nothing.
+pub(crate) fn rounds(gpu: &Gpu, size: ImageSize, kernel: Kernel, area_px: f64) -> &'static [Round] {
+    let deep = area_px > DEEP * size.pixels() as f64;
+    if deep && has_rounds(gpu, kernel) { &ALL_ROUNDS[1..] } else { &ALL_ROUNDS[..1] }
+}
+
+const ALL_ROUNDS: [Round; 3] = [Round::Whole, Round::First, Round::Rest];
+
+fn has_rounds(gpu: &Gpu, kernel: Kernel) -> bool {
+    gpu.is_software() && target(gpu, kernel) == Target::Keys64
 }
 
 /// The contents of the buffer of passes: all parameters, and last what a draw of large splats begins with.
@@ -192,10 +195,12 @@ pub(crate) fn pass_bytes(
 }
 
 impl KeyedPass {
-    /// Compiles the passes of a kernel, once.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, kernel: Kernel, plan: &Plan) {
-        let many_parts = plan.has_many_parts();
-        self.pipelines.entry((kernel, many_parts)).or_insert_with(|| Pipelines::new(gpu, kernel, many_parts));
+    /// Compiles what a frame needs, once.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, kernel: Kernel, resolving: Resolving) {
+        let pipelines = self.pipelines.entry(kernel).or_insert_with(|| Pipelines::new(gpu, kernel));
+        // All at once: a frame in the midst of a movement is no time for it.
+        let rounds = if has_rounds(gpu, kernel) { &ALL_ROUNDS[..] } else { &ALL_ROUNDS[..1] };
+        pipelines.prepare(gpu, rounds, resolving);
     }
 
     /// Draws all splats of a frame into a G-buffer, which it clears. The kernel has been prepared, and there is a splat.
@@ -206,9 +211,9 @@ impl KeyedPass {
         gbuffer: &GBuffer,
         frame: &KeyedFrame<'_>,
     ) {
-        let pipelines = &self.pipelines[&(frame.kernel, frame.plan.has_many_parts())];
+        let pipelines = &self.pipelines[&frame.kernel];
         let bound: Vec<[wgpu::BindGroup; 3]> =
-            frame.chunks.iter().map(|chunk| pipelines.bind(gpu, frame, chunk)).collect();
+            frame.chunks.iter().map(|chunk| bind(gpu, pipelines, frame, chunk)).collect();
         let chunks = frame.chunks.len() as u32;
         let phases = phases(gpu, frame.kernel);
         let pass_at = |band: u32, phase: u32, chunk: u32| (band * phases + phase) * chunks + chunk;
@@ -228,13 +233,16 @@ impl KeyedPass {
                 let pass_offset = offset(pass_at(band, phase, chunk));
                 let [for_compute, for_quads, _] = &bound[chunk as usize];
                 let parts = frame.chunks[chunk as usize].parts.clone();
-                {
+                for round in frame.rounds {
+                    if *round == Round::Rest {
+                        frame.buffers.find(encoder, keys);
+                    }
                     let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                         label: Some("small splats"),
                         ..Default::default()
                     });
-                    pass.set_pipeline(&pipelines.compute);
-                    for part in parts {
+                    pass.set_pipeline(pipelines.compute(*round));
+                    for part in parts.clone() {
                         let groups = frame.plan.parts[part as usize].count.div_ceil(SPLATS_IN_GROUP);
                         pass.set_bind_group(0, for_compute, &[pass_offset, offset(part)]);
                         pass.dispatch_workgroups(groups.min(GROUPS_IN_ROW), groups.div_ceil(GROUPS_IN_ROW), 1);
@@ -258,7 +266,7 @@ impl KeyedPass {
                 frame.buffers.find(encoder, keys);
             }
             let mut pass = gbuffer.begin(encoder, band == 0);
-            pass.set_pipeline(&pipelines.resolve);
+            pass.set_pipeline(pipelines.resolve(frame.resolving));
             pass.set_scissor_rect(0, rows.start, frame.bands.width, rows.end - rows.start);
             // Sums are of all chunks.
             let resolved = if frame.kernel.is_gauss() { 1 } else { chunks };
@@ -272,167 +280,34 @@ impl KeyedPass {
     }
 }
 
-/// Bindings of the three passes: number, stages, whether it is written.
-const UNIFORMS: [(u32, u64); 2] = [(0, size_of::<PassParams>() as u64), (1, size_of::<PartParams>() as u64)];
-
-impl Pipelines {
-    fn new(gpu: &Gpu, kernel: Kernel, many_parts: bool) -> Self {
-        let device = &gpu.device;
-        let target = target(gpu, kernel);
-        let set = |value: bool| f64::from(u8::from(value));
-        // A pass may be given only what it declares.
-        let of_kernel = ("kernel", kernel.code());
-        let mut drawing = vec![of_kernel];
-        if target == Target::Keys64 {
-            drawing.push(("reads_first", set(!gpu.is_software())));
-        }
-        let mut resolving = vec![of_kernel];
-        if !kernel.is_gauss() {
-            resolving.push(("many_parts", set(many_parts)));
-        }
-        let options =
-            |constants| wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: true };
-        let gauss = kernel.is_gauss();
-        let (both, vertex, fragment, compute) = (
-            wgpu::ShaderStages::VERTEX_FRAGMENT,
-            wgpu::ShaderStages::VERTEX,
-            wgpu::ShaderStages::FRAGMENT,
-            wgpu::ShaderStages::COMPUTE,
-        );
-        let read = |binding, stages| (binding, stages, true);
-        let write = |binding, stages| (binding, stages, false);
-        let with_sums = |mut entries: Vec<_>, entry| {
-            if gauss {
-                entries.push(entry);
-            }
-            entries
-        };
-        let layout = |label, uniforms: usize, stages, textures: &[u32], storage: &[(u32, wgpu::ShaderStages, bool)]| {
-            let buffer = |binding, visibility, ty, has_dynamic_offset, bytes| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility,
-                ty: wgpu::BindingType::Buffer {
-                    ty,
-                    has_dynamic_offset,
-                    min_binding_size: std::num::NonZeroU64::new(bytes),
-                },
-                count: None,
-            };
-            let uniforms = UNIFORMS[..uniforms]
-                .iter()
-                .map(|(binding, bytes)| buffer(*binding, stages, wgpu::BufferBindingType::Uniform, true, *bytes));
-            let storage = storage.iter().map(|(binding, stages, read_only)| {
-                buffer(*binding, *stages, wgpu::BufferBindingType::Storage { read_only: *read_only }, false, 0)
-            });
-            let textures = textures.iter().map(|binding| store::layout_entry(*binding, stages));
-            let entries: Vec<_> = uniforms.chain(storage).chain(textures).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
-        };
-        let for_compute = [write(4, compute), write(6, compute), write(7, compute)];
-        let for_quads = [write(4, fragment), read(6, vertex), read(8, vertex)];
-        let for_resolve: (&[_], &[_]) =
-            if gauss { (&[], &[read(4, fragment), read(5, fragment)]) } else { (&[2, 3, 9], &[read(8, fragment)]) };
-        let layouts = [
-            layout("small splats", 2, compute, &[2, 3], &with_sums(for_compute.to_vec(), write(5, compute))),
-            layout("large splats", 1, both, &[2, 3], &with_sums(for_quads.to_vec(), write(5, fragment))),
-            layout("resolved splats", if gauss { 1 } else { 2 }, fragment, for_resolve.0, for_resolve.1),
-        ];
-        let [compute_layout, quads_layout, resolve_layout] = [0, 1, 2].map(|at: usize| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: None,
-                bind_group_layouts: &[Some(&layouts[at])],
-                immediate_size: 0,
-            })
-        });
-        let module = |label, source, target| shader::module(device, label, source, target);
-        let compute = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("small splats"),
-            layout: Some(&compute_layout),
-            module: &module("splat_compute.wgsl", COMPUTE, target),
-            entry_point: Some("draw_small"),
-            compilation_options: options(&drawing),
-            cache: None,
-        });
-        let quads_module = module("splat_quads.wgsl", QUADS, target);
-        let quads = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("large splats"),
-            layout: Some(&quads_layout),
-            vertex: wgpu::VertexState {
-                module: &quads_module,
-                entry_point: Some("place"),
-                compilation_options: options(&drawing),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleStrip, ..Default::default() },
-            depth_stencil: Some(gbuffer::depth_state(wgpu::CompareFunction::Always, false)),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &quads_module,
-                entry_point: Some("cover"),
-                compilation_options: options(&drawing),
-                targets: &[],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        let resolve_module = if gauss {
-            module("splat_blend.wgsl", BLEND, Target::None)
-        } else {
-            module("splat_resolve.wgsl", RESOLVE, Target::None)
-        };
-        let resolve = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("resolved splats"),
-            layout: Some(&resolve_layout),
-            vertex: wgpu::VertexState {
-                module: &resolve_module,
-                entry_point: Some("cover_picture"),
-                compilation_options: options(&resolving),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: Some(gbuffer::depth_state(wgpu::CompareFunction::GreaterEqual, true)),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &resolve_module,
-                entry_point: Some("resolve"),
-                compilation_options: options(&resolving),
-                targets: &gbuffer::COLOR_TARGETS,
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        Self { compute, quads, resolve, layouts }
+/// Bind groups of the three passes for a chunk.
+fn bind(gpu: &Gpu, pipelines: &Pipelines, frame: &KeyedFrame<'_>, chunk: &Chunk) -> [wgpu::BindGroup; 3] {
+    let KeyedFrame { passes, parts, buffers, .. } = frame;
+    let gauss = frame.kernel.is_gauss();
+    let sums = gauss.then(|| buffers.sums.entry(5));
+    let group = |at: usize, entries: Vec<wgpu::BindGroupEntry<'_>>| {
+        let entries: Vec<_> = entries.into_iter().chain(sums.clone()).collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipelines.layouts[at],
+            entries: &entries,
+        })
+    };
+    let (pass, part) = (passes.entry_of::<PassParams>(0), parts.entry_of::<PartParams>(1));
+    let (keys, list, draw) = (buffers.keys.entry(4), buffers.list.entry(6), buffers.draw.entry(7));
+    let store = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3)];
+    let drawn = [&store[..], std::slice::from_ref(&keys)].concat();
+    let mut computed = [&drawn[..], &[part.clone(), list.clone(), draw]].concat();
+    if pipelines.target == Target::Keys64 {
+        computed.push(buffers.found.entry(9));
     }
-
-    /// Bind groups of the three passes for a chunk.
-    fn bind(&self, gpu: &Gpu, frame: &KeyedFrame<'_>, chunk: &Chunk) -> [wgpu::BindGroup; 3] {
-        let KeyedFrame { passes, parts, buffers, .. } = frame;
-        let gauss = frame.kernel.is_gauss();
-        let sums = gauss.then(|| buffers.sums.entry(5));
-        let group = |at: usize, entries: Vec<wgpu::BindGroupEntry<'_>>| {
-            let entries: Vec<_> = entries.into_iter().chain(sums.clone()).collect();
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &self.layouts[at],
-                entries: &entries,
-            })
-        };
-        let (pass, part) = (passes.entry_of::<PassParams>(0), parts.entry_of::<PartParams>(1));
-        let (keys, list, draw) = (buffers.keys.entry(4), buffers.list.entry(6), buffers.draw.entry(7));
-        let store = [pass.clone(), chunk.balls.entry(2), chunk.normal_colors.entry(3)];
-        let drawn = [&store[..], std::slice::from_ref(&keys)].concat();
-        let all_parts = parts.entry(8);
-        let resolved = if gauss {
-            vec![pass, keys]
-        } else {
-            [&store[..], &[part.clone(), all_parts.clone(), buffers.found.entry(9)]].concat()
-        };
-        [
-            group(0, [&drawn[..], &[part, list.clone(), draw]].concat()),
-            group(1, [&drawn[..], &[all_parts, list]].concat()),
-            group(2, resolved),
-        ]
-    }
+    let all_parts = parts.entry(8);
+    let resolved = if gauss {
+        vec![pass, keys]
+    } else {
+        [&store[..], &[part, all_parts.clone(), buffers.found.entry(9)]].concat()
+    };
+    [group(0, computed), group(1, [&drawn[..], &[all_parts, list]].concat()), group(2, resolved)]
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 pub(crate) mod depth_test;
 pub(crate) mod keyed;
 pub(crate) mod params;
+pub(crate) mod pipelines;
 pub(crate) mod store;
 
 #[cfg(test)]
@@ -30,6 +31,7 @@ pub(crate) fn sources() -> impl Iterator<Item = (&'static str, &'static str, Tar
         .into_iter()
         .flat_map(|(name, source)| [Target::Keys64, Target::Keys32, Target::Sums].map(|target| (name, source, target)));
     delivering
+        .chain([("compute", COMPUTE, Target::Keys64Found)])
         .chain([("resolve", RESOLVE), ("blend", BLEND), ("depth test", DEPTH_TEST)].map(|(n, s)| (n, s, Target::None)))
 }
 

@@ -4,9 +4,9 @@ mod budget;
 pub mod description;
 
 use crate::residency::{FileId, PageRequest, Residency};
-use crate::selection::{Selection, Selector, Target};
+use crate::selection::{DrawSource, Selection, Selector, Target};
 use crate::splats::ThresholdSearch;
-use crate::{CutReport, Fineness, InstanceId, Interrupt, Similarity, SplatSelector, ViewId};
+use crate::{CutReport, Fineness, InstanceId, Interrupt, ModelView, Similarity, SplatSelector, ViewId};
 use gigalod_geom::{Aabb, Camera};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -153,6 +153,16 @@ impl Scene {
             .iter()
             .filter(move |(target, _)| target.view == view)
             .filter_map(|(target, lists)| Some((self.instances.get(&target.instance)?, &lists.shown)))
+    }
+
+    /// Pixels of `camera`'s picture that the last cut of `view` covers, each splat by itself; an estimate. Lists that lie on the
+    /// device are not counted.
+    pub fn area_px(&self, view: ViewId, camera: &Camera) -> f64 {
+        let area_px = |(instance, selection): (&Instance, &Selection)| match &selection.draw {
+            DrawSource::Splats(list) => list.area_px(&ModelView::new(camera, &instance.placement)),
+            DrawSource::OnDevice(_) => 0.0,
+        };
+        self.draws(view).map(area_px).sum()
     }
 
     /// Ends the frame: hands the union of all views' requests to residency.

@@ -5,6 +5,7 @@
 //! Each cut begins at the root; ARCHITECTURE.md says what refining the last one would gain (at rest a third) and cost (a fifth of
 //! every other frame, and 28 bytes a splat).
 
+mod area;
 mod crew;
 mod group;
 mod lanes;

@@ -45,6 +45,11 @@ fn it_begins_with_the_view_that_a_picture_has_by_default() {
         let expected = Camera::orbit(&bounds, up, [0.0, 0.0], 1.0, 0.7, SIZE);
         assert!((begun.eye - expected.eye).length() < 1e-12 && (begun.up - expected.up).length() < 1e-12);
     }
+    let terrain = Aabb { min: DVec3::ZERO, max: DVec3::new(600.0, 500.0, 40.0) };
+    let begun = Navigation::new(terrain, UpAxis::Z, 0.7, SIZE).camera(SIZE);
+    let expected = Camera::orbit(&terrain, UpAxis::Z, default_orbit_deg(&terrain, UpAxis::Z), 1.0, 0.7, SIZE);
+    assert!(begun.forward.z < -0.5, "from above");
+    assert!((begun.eye - expected.eye).length() < 1e-9 && (begun.up - expected.up).length() < 1e-12);
 }
 
 #[test]
@@ -87,7 +92,7 @@ fn looking_turns_the_eye_on_the_spot_and_flying_moves_it_along_its_axes() {
     // Dragged to the right, the picture goes to the right: the eye turns to the left.
     assert!(navigation.camera(SIZE).forward.dot(before.right) < -0.01);
     navigation.apply(&Input::Home, SIZE);
-    navigation.apply(&Input::Fly { by: DVec3::new(0.0, 0.0, 0.25) }, SIZE);
+    navigation.apply(&Input::Fly { by: DVec3::new(0.0, 0.0, 0.25), ahead: None }, SIZE);
     let flown = navigation.eye() - eye;
     assert!((flown - before.forward * (eye.length() * 0.25)).length() < 1e-9, "{flown}");
 }
@@ -103,17 +108,103 @@ fn a_picked_pivot_is_in_the_middle_and_is_turned_around() {
     assert!(((navigation.eye() - at).length() - distance).abs() < 1e-9);
 }
 
+/// A ball with leaves of this radius, as the picker tells of them.
+const LEAF: f64 = 0.005;
+
+fn leaf(at: DVec3) -> Anchor {
+    Anchor { at, radius: 2.0 * LEAF }
+}
+
 #[test]
-fn nobody_comes_so_near_that_there_is_nothing_left_to_see() {
+fn zoom_and_flight_end_before_the_surface_while_its_leaves_are_small() {
     let mut navigation = navigation(DVec3::ZERO, 1.0);
-    let surface = Anchor { at: DVec3::Z, radius: 0.01 };
-    navigation.set_anchors(&[surface], SIZE);
+    let surface = leaf(DVec3::new(0.3, 0.2, (1.0_f64 - 0.13).sqrt()));
+    let leaves_in_height = |navigation: &Navigation| {
+        let camera = navigation.camera(SIZE);
+        2.0 * camera.tan_half_fov().y * camera.view_point(surface.at).z / (2.0 * LEAF)
+    };
+    let at_px = pixel(&navigation, surface.at);
     for _ in 0..100 {
-        let at_px = pixel(&navigation, surface.at);
         navigation.apply(&Input::Zoom { factor: 0.7, at_px, surface: Some(surface) }, SIZE);
     }
-    let depth = (navigation.eye() - surface.at).length();
-    assert!((0.02..0.04).contains(&depth), "{depth}: the ball just fills the picture's height");
+    let zoomed = leaves_in_height(&navigation);
+    assert!((zoomed / LEAST_LEAVES - 1.0).abs() < 1e-6, "{zoomed}");
+    // Who is there can go back.
+    navigation.apply(&Input::Zoom { factor: 2.0, at_px, surface: Some(surface) }, SIZE);
+    assert!((leaves_in_height(&navigation) / zoomed - 2.0).abs() < 1e-3);
+
+    navigation.apply(&Input::Home, SIZE);
+    navigation.apply(&Input::Pivot(surface), SIZE);
+    for _ in 0..200 {
+        navigation.apply(&Input::Fly { by: DVec3::Z * 0.2, ahead: Some(surface) }, SIZE);
+    }
+    let flown = leaves_in_height(&navigation);
+    assert!((LEAST_LEAVES * 0.999..LEAST_LEAVES * 1.1).contains(&flown), "{flown}");
+    // One step that is larger than the room ends there too.
+    navigation.apply(&Input::Home, SIZE);
+    navigation.apply(&Input::Pivot(surface), SIZE);
+    navigation.apply(&Input::Fly { by: DVec3::Z * 50.0, ahead: Some(surface) }, SIZE);
+    assert!((leaves_in_height(&navigation) / LEAST_LEAVES - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn zooming_out_leads_back_to_the_whole_wherever_the_cursor_is() {
+    for at_px in [DVec2::new(320.0, 240.0), DVec2::new(10.0, 10.0), DVec2::new(630.0, 300.0)] {
+        let mut navigation = navigation(DVec3::ZERO, 1.0);
+        navigation.apply(&Input::Pan { by_px: DVec2::new(180.0, -100.0) }, SIZE);
+        let surface = leaf(DVec3::new(0.4, -0.5, 0.59_f64.sqrt()));
+        let over = pixel(&navigation, surface.at);
+        for _ in 0..8 {
+            navigation.apply(&Input::Zoom { factor: 0.8, at_px: over, surface: Some(surface) }, SIZE);
+        }
+        let mut before = navigation.clone();
+        for _ in 0..40 {
+            navigation.apply(&Input::Zoom { factor: 1.1, at_px, surface: None }, SIZE);
+            let moved = (pixel(&navigation, surface.at) - pixel(&before, surface.at)).length();
+            assert!(moved < 120.0, "{moved}: no jumps");
+            before = navigation.clone();
+            let camera = navigation.camera(SIZE);
+            let middle = camera.view_point(DVec3::ZERO);
+            let whole = 2.0 * (middle.z / navigation.fit);
+            if whole > 3.0 {
+                // All of the ball is in the picture.
+                let at = pixel(&navigation, DVec3::ZERO);
+                let radius = camera.focal_px() / middle.z;
+                assert!(at.y - radius > 0.0 && at.y + radius < 480.0, "{at} {radius}");
+                assert!(at.x - radius > 0.0 && at.x + radius < 640.0, "{at} {radius}");
+            }
+        }
+        assert!(pixel(&navigation, DVec3::ZERO).distance(DVec2::new(320.0, 240.0)) < 1.0);
+    }
+}
+
+#[test]
+fn who_zooms_in_beside_the_model_comes_to_it() {
+    let mut navigation = navigation(DVec3::ZERO, 1.0);
+    for _ in 0..12 {
+        navigation.apply(&Input::Zoom { factor: 0.8, at_px: DVec2::new(600.0, 20.0), surface: None }, SIZE);
+    }
+    let at = pixel(&navigation, DVec3::ZERO);
+    assert!((navigation.eye().length() - 1.0).abs() < 1.0, "{}", navigation.eye());
+    let camera = navigation.camera(SIZE);
+    let seen = sphere(DVec3::ZERO, 1.0, 5000).into_iter().filter(|point| {
+        let at = pixel(&navigation, *point);
+        camera.view_point(*point).z > 0.0 && (0.0..640.0).contains(&at.x) && (0.0..480.0).contains(&at.y)
+    });
+    assert!(seen.count() > 20, "the middle is at {at}");
+}
+
+#[test]
+fn zooming_in_anywhere_and_out_again_there_changes_nothing() {
+    for at in [DVec3::new(0.4, -0.5, 0.59_f64.sqrt()), DVec3::new(0.0, 0.9, 0.19_f64.sqrt())] {
+        let mut navigation = navigation(DVec3::ZERO, 1.0);
+        let (surface, eye) = (leaf(at), navigation.eye());
+        let at_px = pixel(&navigation, at);
+        for factor in [0.8, 0.8, 0.8, 1.25, 1.25, 1.25] {
+            navigation.apply(&Input::Zoom { factor, at_px, surface: Some(surface) }, SIZE);
+        }
+        assert!((navigation.eye() - eye).length() < 1e-9 * eye.length(), "{} {eye}", navigation.eye());
+    }
 }
 
 fn any_input() -> impl Strategy<Value = Input> {
@@ -133,7 +224,7 @@ fn any_input() -> impl Strategy<Value = Input> {
             surface: direction.map(|direction| on_surface(direction.normalize_or(DVec3::X))),
         }),
         px().prop_map(|by_px| Input::Look { by_px }),
-        point().prop_map(|by| Input::Fly { by: by * 10.0 }),
+        point().prop_map(|by| Input::Fly { by: by * 10.0, ahead: None }),
         point().prop_map(|at| Input::Pivot(on_surface(at.normalize_or(DVec3::X)))),
         Just(Input::Home),
     ]
