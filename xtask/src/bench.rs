@@ -34,13 +34,15 @@ const SECTIONS: [Section; 3] =
     [("importing", importing::rows), ("building", building::rows), ("drawing", drawing::rows)];
 
 pub(crate) fn bench(arguments: &[String]) -> Result<()> {
-    let scope = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        [] => Scope { large: false, only: None },
-        ["--large"] => Scope { large: true, only: None },
-        ["--only", section] => Scope { large: false, only: Some(section) },
-        ["--large", "--only", section] => Scope { large: true, only: Some(section) },
-        _ => bail!("usage: cargo xtask bench [--large] [--only importing|building|drawing]"),
-    };
+    let mut scope = Scope { large: false, only: None };
+    let mut rest = arguments.iter().map(String::as_str);
+    while let Some(argument) = rest.next() {
+        match argument {
+            "--large" => scope.large = true,
+            "--only" => scope.only = Some(rest.next().context("--only: expected a section")?),
+            _ => bail!("usage: cargo xtask bench [--large] [--only importing|building|drawing]"),
+        }
+    }
     setup::system()?;
     let bench = Bench(Program::build("bench")?);
     let path = project().join("docs/benchmarks.md");
