@@ -1,11 +1,23 @@
 //! What the window shows and how it answers a person; no window, no device.
 //!
+//! Its parts: [`inbox`] takes in what other threads have found or made, [`models`] puts models on the stage and takes them off,
+//! [`notices`] tells a person, [`names`] calls files what they are to be called. What lies over the picture is drawn by the modules
+//! `panel`, `overlay` and `viewport`.
+//!
 //! Goes in: egui's events, figures of the stage, answers of the picker, files that were opened. Comes out: egui's shapes, wishes and
 //! orders for the stage. What always holds: nothing here waits or reads a file; every error ends as a notice on the screen.
 
-use crate::host::{Folder, Host, Model, Opened, OpenedScene, Preview, up_of};
-use crate::jobs::{Finished, JobNumber, Jobs};
-use crate::mailbox::{Figures, Mailbox, ModelKey, News, Order, Wish};
+mod inbox;
+mod models;
+mod names;
+mod notices;
+
+pub(crate) use names::Names;
+pub(crate) use notices::Notice;
+
+use crate::host::{Folder, Host, Model};
+use crate::jobs::{JobNumber, Jobs};
+use crate::mailbox::{Figures, Mailbox, ModelKey, Order, Wish};
 use crate::measure::Measuring;
 use crate::navigation::{Anchor, Input, Navigation};
 use crate::panel;
@@ -16,18 +28,9 @@ use crate::settings::{FirstLook, Options, Settings};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use glam::DVec2;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
-
-/// Something to tell a person.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Notice {
-    pub(crate) text: String,
-    pub(crate) is_error: bool,
-    /// Seconds of egui's clock at which it goes by itself; errors stay.
-    pub(crate) until: f64,
-}
 
 /// A model on the stage.
 pub(crate) struct Staged {
@@ -93,13 +96,6 @@ pub(crate) struct ZoomToCome {
     pub(crate) since: f64,
 }
 
-/// Names of files to write, as a person may change them.
-pub(crate) struct Names {
-    pub(crate) picture: String,
-    pub(crate) path: String,
-    pub(crate) scene: String,
-}
-
 impl Viewer {
     pub(crate) fn new(
         options: &Options,
@@ -127,7 +123,7 @@ impl Viewer {
             folder: None,
             figures: Figures::default(),
             frame_times: std::collections::VecDeque::new(),
-            names: Names { picture: "view-1.png".into(), path: "path.json".into(), scene: "scene.toml".into() },
+            names: Names::default(),
             shows_help: false,
             shows_panel: true,
             flies: false,
@@ -246,185 +242,6 @@ impl Viewer {
         }
     }
 
-    /// Takes in what other threads have to say.
-    fn collect(&mut self, now: f64) {
-        let delivery = self.mailbox.collect();
-        for figures in delivery.figures {
-            self.tally.drawn(&figures);
-            self.frame_times.push_back(figures.frame_ms as f32);
-            if self.frame_times.len() > 200 {
-                self.frame_times.pop_front();
-            }
-            for problem in &figures.problems {
-                if !self.told_problems.contains(problem) {
-                    self.told_problems.push(problem.clone());
-                    self.notice_error(problem);
-                }
-            }
-            self.figures = figures;
-        }
-        for news in delivery.news {
-            match news {
-                News::Picture(name, size, rgba) => self.jobs.write_picture(name, size, rgba),
-                News::DeviceLost(why) => self.wants_recovery = Some(why),
-                News::Problem(problem) => self.notice_error(&problem),
-            }
-        }
-        while let Ok(answer) = self.answers.try_recv() {
-            self.hear(answer, now);
-        }
-        let previews: Vec<(JobNumber, Preview)> =
-            self.jobs.running().iter().filter_map(|job| Some((job.number, job.work.take_preview()?))).collect();
-        for (job, Preview { model, points }) in previews {
-            self.add(model, Some((job, points)));
-            self.show_whole();
-        }
-        for finished in self.jobs.finished() {
-            match finished {
-                Finished::Opened(job, opened) => {
-                    let previews = self.previews_of(job);
-                    match *opened {
-                        Ok(opened) => self.take(opened, !previews.is_empty(), now),
-                        Err(error) => self.notice_error(&error),
-                    }
-                    // Not before the model is there: something is shown all the time.
-                    previews.into_iter().for_each(|key| self.remove(key));
-                }
-                Finished::Cancelled(job, name) => {
-                    self.notice(&format!("{name}: cancelled"), now);
-                    self.previews_of(job).into_iter().for_each(|key| self.remove(key));
-                }
-                Finished::Wrote(path, Ok(())) => {
-                    self.tally.written.push(path.display().to_string());
-                    self.notice(&format!("written: {}", path.display()), now);
-                }
-                Finished::Wrote(_, Err(error)) => self.notice_error(&error),
-            }
-        }
-    }
-
-    fn previews_of(&self, job: JobNumber) -> Vec<ModelKey> {
-        let is_of_job = |staged: &&Staged| staged.preview.is_some_and(|(number, _)| number == job);
-        self.models.iter().filter(is_of_job).map(|staged| staged.key).collect()
-    }
-
-    /// Shows what was opened; from where a person looks at its preview, if there was one.
-    fn take(&mut self, opened: Opened, had_preview: bool, now: f64) {
-        match opened {
-            Opened::Model(model) => {
-                self.add(model, None);
-                if had_preview {
-                    self.navigation.set_bounds(self.bounds(), self.size);
-                } else {
-                    self.show_whole();
-                }
-            }
-            Opened::Scene(scene) => self.show_scene(scene),
-            Opened::Folder(folder) => self.folder = Some(folder),
-            Opened::Path(path) => {
-                self.recorder.load(path);
-                self.recorder.play(now);
-            }
-        }
-    }
-
-    fn hear(&mut self, answer: Answer, now: f64) {
-        match answer {
-            Answer::Anchors(anchors) => self.navigation.set_anchors(&anchors, self.size),
-            Answer::Problem(problem) => self.notice_error(&problem),
-            Answer::Point { purpose: Purpose::Measure(number), found, .. } => {
-                if let Some(found) = found {
-                    self.navigation.apply(&Input::Anchor(found.anchor()), self.size);
-                }
-                self.measuring.found(number, found);
-            }
-            Answer::Point { purpose: Purpose::Pivot, found: Some(found), .. } => {
-                self.navigation.apply(&Input::Pivot(found.anchor()), self.size);
-            }
-            Answer::Point { purpose: Purpose::Zoom, at_px, found } => {
-                self.under_cursor = Some((at_px, found.map(|found| found.anchor())));
-                if let Some(ZoomToCome { factor, at_px, .. }) = self.zoom_to_come.take() {
-                    self.zoom(at_px, factor, now);
-                }
-            }
-            Answer::Point { purpose: Purpose::Ahead, found, .. } => self.ahead = found.map(|found| found.anchor()),
-            Answer::Point { .. } => {}
-        }
-    }
-
-    /// Puts a model on the stage.
-    fn add(&mut self, model: Model, preview: Option<(JobNumber, u64)>) {
-        let key = ModelKey(self.next_key);
-        self.next_key += 1;
-        self.mailbox.order(Order::Add(key, model.file.clone(), model.placements.clone()));
-        let _ = self.ask.send(Question::Add(key, model.clone()));
-        if self.models.is_empty() {
-            let stem = stem_of(&model.source);
-            self.names =
-                Names { picture: format!("{stem}-1.png"), path: format!("{stem}.json"), scene: format!("{stem}.toml") };
-        }
-        self.models.push(Staged { key, model, preview });
-    }
-
-    pub(crate) fn remove(&mut self, key: ModelKey) {
-        self.models.retain(|staged| staged.key != key);
-        self.mailbox.order(Order::Remove(key));
-        let _ = self.ask.send(Question::Remove(key));
-        self.measuring = Measuring::default();
-    }
-
-    fn show_scene(&mut self, scene: OpenedScene) {
-        let OpenedScene { description, models } = scene;
-        let gone: Vec<ModelKey> = self.models.iter().map(|staged| staged.key).collect();
-        gone.into_iter().for_each(|key| self.remove(key));
-        self.scene_up = description.up;
-        self.settings.background = description.background.unwrap_or(self.settings.background);
-        self.settings.towards_light = description.towards_light();
-        description.not_drawn().iter().for_each(|missing| self.notice_error(missing));
-        models.into_iter().for_each(|model| self.add(model, None));
-        let camera = description.camera.unwrap_or_default();
-        self.fov_deg = camera.fov_deg.unwrap_or(self.fov_deg);
-        self.show_whole();
-        if camera.eye.is_some() || camera.target.is_some() {
-            let (eye, target) = (self.navigation.eye(), self.navigation.pivot());
-            self.navigation.set_home(camera.eye.unwrap_or(eye), camera.target.unwrap_or(target), self.size);
-        }
-    }
-
-    /// Around all models; world space.
-    pub(crate) fn bounds(&self) -> Aabb {
-        let corners = self.models.iter().flat_map(|Staged { model, .. }| {
-            let corners = model.file.skeleton().root().bounds.corners();
-            let place = move |at: &gigalod_runtime::Similarity| {
-                let at = *at;
-                corners.map(|corner| at.position + at.rotation * (corner * at.scale))
-            };
-            model.placements.iter().flat_map(place)
-        });
-        Aabb::of(corners)
-    }
-
-    /// Which way is up.
-    pub(crate) fn up(&self) -> UpAxis {
-        let first = self.models.first().map(|staged| std::slice::from_ref(&staged.model));
-        self.scene_up.unwrap_or(up_of(first.unwrap_or_default()))
-    }
-
-    /// Looks at everything, from where the options say.
-    fn show_whole(&mut self) {
-        let (bounds, up, fov) = (self.bounds(), self.up(), self.fov_deg.to_radians());
-        self.navigation = Navigation::new(bounds, up, fov, self.size);
-        match self.first_look {
-            FirstLook::Whole => {}
-            FirstLook::From { eye, target } => self.navigation.set_home(eye, target, self.size),
-            FirstLook::Orbit([azimuth, elevation, zoom]) => {
-                let camera = Camera::orbit(&bounds, up, [azimuth, elevation], zoom, fov, self.size);
-                self.navigation.set_home(camera.eye, bounds.center(), self.size);
-            }
-        }
-        (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
-    }
-
     /// At exit, when nobody looks any more: ends builds, and waits until all that is being written is on disk.
     pub(crate) fn finish(&mut self) {
         self.collect(0.0);
@@ -435,37 +252,13 @@ impl Viewer {
         }
     }
 
-    /// Tells something that may be forgotten.
-    /// Tells news, in the place of older news.
-    pub(crate) fn notice(&mut self, text: &str, now: f64) {
-        self.notices.retain(|notice| notice.is_error);
-        self.notices.push(Notice { text: text.to_string(), is_error: false, until: now + 6.0 });
-    }
-
-    /// Tells of something that went wrong and was put right.
-    pub(crate) fn notice_mended(&mut self, text: &str, now: f64) {
-        self.tally.problems.push(text.to_string());
-        self.notice(text, now);
-    }
-
-    /// Tells an error, once as long as it is shown.
-    pub(crate) fn notice_error(&mut self, text: &str) {
-        if self.notices.iter().any(|notice| notice.text == text) {
-            return;
-        }
-        self.tally.problems.push(text.to_string());
-        self.notices.push(Notice { text: text.to_string(), is_error: true, until: f64::INFINITY });
-    }
-
     /// The next free name of a picture: numbers go up, and no file is replaced unasked.
     pub(crate) fn take_picture(&mut self, now: f64) {
         if self.models.is_empty() {
             self.notice("nothing to take a picture of", now);
             return;
         }
-        let name = PathBuf::from(&self.names.picture);
-        self.mailbox.order(Order::Picture(name));
-        self.names.picture = next_name(&self.names.picture);
+        self.mailbox.order(Order::Picture(self.names.next_picture()));
         self.notice("the picture is taken as soon as it is as fine as it gets", now);
     }
 
@@ -478,43 +271,5 @@ impl Viewer {
         } else {
             self.recorder.start(now);
         }
-    }
-}
-
-/// `a/scan.ply.gz` → `scan`.
-fn stem_of(model: &Path) -> String {
-    let name = model.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// `statue-1.png` → `statue-2.png`; a name without a number gets one.
-fn next_name(name: &str) -> String {
-    let path = Path::new(name);
-    let extension = path.extension().map(|extension| format!(".{}", extension.to_string_lossy())).unwrap_or_default();
-    let stem = name.strip_suffix(&extension).unwrap_or(name);
-    let digits = stem.len() - stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-    let (front, number) = stem.split_at(stem.len() - digits);
-    match number.parse::<u64>() {
-        Ok(number) => format!("{front}{}{extension}", number.saturating_add(1)),
-        Err(_) => format!("{stem}-2{extension}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Path, next_name, stem_of};
-
-    #[test]
-    fn what_is_saved_is_called_as_the_model() {
-        let stems = ["a/scan.ply.gz", "lion.copc.laz", "b"].map(|name| stem_of(Path::new(name)));
-        assert_eq!(stems, ["scan", "lion.copc", "b"]);
-    }
-
-    #[test]
-    fn names_count_up() {
-        assert_eq!(next_name("statue-1.png"), "statue-2.png");
-        assert_eq!(next_name("a/b9.png"), "a/b10.png");
-        assert_eq!((next_name("x.png").as_str(), next_name("x").as_str()), ("x-2.png", "x-2"));
     }
 }

@@ -1,0 +1,88 @@
+//! Models on the stage: one more, one less, those of a scene instead, and a look at all of them.
+//!
+//! Goes in: opened models and scenes. Comes out: orders for the stage and the picker, and where the camera begins. What always holds: stage,
+//! picker and list have the same models.
+
+use super::{Names, Staged, Viewer};
+use crate::host::{Model, OpenedScene, up_of};
+use crate::jobs::JobNumber;
+use crate::mailbox::{ModelKey, Order};
+use crate::measure::Measuring;
+use crate::navigation::Navigation;
+use crate::picker::Question;
+use crate::settings::FirstLook;
+use gigalod_geom::camera::UpAxis;
+use gigalod_geom::{Aabb, Camera};
+
+impl Viewer {
+    /// Puts a model on the stage.
+    pub(super) fn add(&mut self, model: Model, preview: Option<(JobNumber, u64)>) {
+        let key = ModelKey(self.next_key);
+        self.next_key += 1;
+        self.mailbox.order(Order::Add(key, model.file.clone(), model.placements.clone()));
+        let _ = self.ask.send(Question::Add(key, model.clone()));
+        if self.models.is_empty() {
+            self.names = Names::of(&model.source);
+        }
+        self.models.push(Staged { key, model, preview });
+    }
+
+    pub(crate) fn remove(&mut self, key: ModelKey) {
+        self.models.retain(|staged| staged.key != key);
+        self.mailbox.order(Order::Remove(key));
+        let _ = self.ask.send(Question::Remove(key));
+        self.measuring = Measuring::default();
+    }
+
+    pub(super) fn show_scene(&mut self, scene: OpenedScene) {
+        let OpenedScene { description, models } = scene;
+        let gone: Vec<ModelKey> = self.models.iter().map(|staged| staged.key).collect();
+        gone.into_iter().for_each(|key| self.remove(key));
+        self.scene_up = description.up;
+        self.settings.background = description.background.unwrap_or(self.settings.background);
+        self.settings.towards_light = description.towards_light();
+        description.not_drawn().iter().for_each(|missing| self.notice_error(missing));
+        models.into_iter().for_each(|model| self.add(model, None));
+        let camera = description.camera.unwrap_or_default();
+        self.fov_deg = camera.fov_deg.unwrap_or(self.fov_deg);
+        self.show_whole();
+        if camera.eye.is_some() || camera.target.is_some() {
+            let (eye, target) = (self.navigation.eye(), self.navigation.pivot());
+            self.navigation.set_home(camera.eye.unwrap_or(eye), camera.target.unwrap_or(target), self.size);
+        }
+    }
+
+    /// Around all models; world space.
+    pub(crate) fn bounds(&self) -> Aabb {
+        let corners = self.models.iter().flat_map(|Staged { model, .. }| {
+            let corners = model.file.skeleton().root().bounds.corners();
+            let place = move |at: &gigalod_runtime::Similarity| {
+                let at = *at;
+                corners.map(|corner| at.position + at.rotation * (corner * at.scale))
+            };
+            model.placements.iter().flat_map(place)
+        });
+        Aabb::of(corners)
+    }
+
+    /// Which way is up.
+    pub(crate) fn up(&self) -> UpAxis {
+        let first = self.models.first().map(|staged| std::slice::from_ref(&staged.model));
+        self.scene_up.unwrap_or(up_of(first.unwrap_or_default()))
+    }
+
+    /// Looks at everything, from where the options say.
+    pub(super) fn show_whole(&mut self) {
+        let (bounds, up, fov) = (self.bounds(), self.up(), self.fov_deg.to_radians());
+        self.navigation = Navigation::new(bounds, up, fov, self.size);
+        match self.first_look {
+            FirstLook::Whole => {}
+            FirstLook::From { eye, target } => self.navigation.set_home(eye, target, self.size),
+            FirstLook::Orbit([azimuth, elevation, zoom]) => {
+                let camera = Camera::orbit(&bounds, up, [azimuth, elevation], zoom, fov, self.size);
+                self.navigation.set_home(camera.eye, bounds.center(), self.size);
+            }
+        }
+        (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
+    }
+}
