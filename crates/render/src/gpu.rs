@@ -215,7 +215,19 @@ impl Gpu {
     /// # Errors
     /// As for [`Gpu::check`].
     pub(crate) fn wait(&self) -> Result<(), RenderError> {
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.poll(wgpu::PollType::wait_indefinitely())
+    }
+
+    /// Waits until the device has done what it was given up to then.
+    ///
+    /// # Errors
+    /// As for [`Gpu::check`].
+    pub(crate) fn wait_for(&self, submitted: wgpu::SubmissionIndex) -> Result<(), RenderError> {
+        self.poll(wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None })
+    }
+
+    fn poll(&self, until: wgpu::PollType) -> Result<(), RenderError> {
+        let polled = self.device.poll(until);
         self.check()?;
         polled.map(|_| ()).map_err(|error| RenderError::Device(error.to_string()))
     }

@@ -7,6 +7,8 @@
 //! made it, never a black picture; only the baseline of WebGPU is needed.
 #![forbid(unsafe_code)]
 
+mod buffers;
+mod commands;
 mod error;
 mod gbuffer;
 mod gpu;
@@ -14,14 +16,18 @@ mod light;
 mod memory;
 mod readback;
 mod renderer;
+#[cfg(test)]
+mod renderer_tests;
 mod shader;
 mod splats;
 mod staging;
+mod targets;
 #[cfg(feature = "window")]
 pub mod window;
 
 pub use error::RenderError;
 pub use gpu::{Gpu, GpuLevel};
 pub use light::Lighting;
-pub use renderer::{Frame, Look, Picture, Renderer};
+pub use renderer::{Frame, Look, Renderer};
 pub use splats::Kernel;
+pub use targets::Picture;

@@ -4,20 +4,20 @@
 //! is within the budget; a frame like the last one creates no buffer and no texture; after any error the renderer can be used
 //! again, at the latest after [`Renderer::recover`].
 
-use crate::gbuffer::{self, GBuffer};
-use crate::light::{LightParams, LightPass, PICTURE};
-use crate::memory::{self, Pool};
-use crate::readback::{self, read_texture};
+use crate::buffers::Buffers;
+use crate::commands::Commands;
+use crate::light::LightPass;
 use crate::splats::Kernel;
 use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
-use crate::splats::keyed::{self, Bands, KeyedBuffers, KeyedFrame, KeyedPass};
+use crate::splats::keyed::{self, Bands, KeyedFrame, KeyedPass};
 use crate::splats::params::STRIDE;
 use crate::splats::pipelines::{Resolving, Round};
-use crate::splats::store::{self, Chunk, Plan};
+use crate::splats::store::{self, Plan};
 use crate::staging::Staging;
-use crate::{Gpu, GpuLevel, Lighting, RenderError};
+use crate::targets::Targets;
+use crate::{Gpu, GpuLevel, Lighting, Picture, RenderError, gbuffer, memory};
 use gigalod_geom::{Camera, ImageSize};
-use gigalod_runtime::{DrawSource, ModelView, Similarity, SplatList};
+use gigalod_runtime::{DrawSource, Interrupt, ModelView, Similarity, SplatList};
 
 /// How things are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,19 +37,6 @@ pub struct Frame<'a> {
     pub look: Look,
     /// What each instance draws, and where it stands.
     pub draws: Vec<(Similarity, &'a DrawSource)>,
-}
-
-/// A finished picture and what it was lit from, on the host; rows from the top.
-#[derive(Clone, Debug)]
-pub struct Picture {
-    /// Pixels.
-    pub size: ImageSize,
-    /// 8-bit sRGB and alpha, 4 bytes a pixel.
-    pub rgba: Vec<u8>,
-    /// Distance along the view axis, world units; `+inf` for background.
-    pub depth: Vec<f32>,
-    /// Largest distance in pixels between two points of the splat that was drawn; 0 for background.
-    pub footprint_px: Vec<f32>,
 }
 
 /// Draws frames; keeps pipelines, targets and buffers between them.
@@ -76,31 +63,6 @@ struct OnDevice {
     resolving: Resolving,
     bands: Bands,
     plan: Plan,
-}
-
-/// What a picture of one size is drawn into.
-#[derive(Debug)]
-struct Targets {
-    gbuffer: GBuffer,
-    picture: wgpu::Texture,
-}
-
-impl Targets {
-    /// Frees them at once; the picture when nobody shows it any more.
-    fn free(self) {
-        self.gbuffer.free();
-    }
-}
-
-/// Buffers that are kept.
-#[derive(Debug)]
-struct Buffers {
-    chunks: Vec<Chunk>,
-    keyed: KeyedBuffers,
-    passes: Pool,
-    parts: Pool,
-    light: Pool,
-    readback: Pool,
 }
 
 /// Parts that [`Renderer::most_splats`] leaves room for.
@@ -138,8 +100,8 @@ impl Renderer {
 
     /// Bytes that are taken on the device: targets, and all buffers that are kept.
     pub fn gpu_bytes(&self) -> u64 {
-        let targets = self.targets.as_ref().map_or(0, |targets| targets_bytes(targets.gbuffer.size));
-        Staging::BYTES + targets + self.buffers.all().map(Pool::bytes).sum::<u64>()
+        let targets = self.targets.as_ref().map_or(0, |targets| Targets::bytes(targets.gbuffer.size));
+        Staging::BYTES + targets + self.buffers.bytes()
     }
 
     /// Bytes that the last frame sent to the device.
@@ -158,12 +120,13 @@ impl Renderer {
         const NAMES: u64 = u32::MAX as u64 - 1;
         let Some(budget) = self.budget else { return NAMES };
         let room = budget.saturating_sub(self.bytes_without_splats(size, kernel));
-        // Whole rows of textures; of several chunks all but the last are full, and the list has room for one.
+        // Whole rows of textures, and the smallest slices; the list has room for one slice.
         let listed = if self.gpu.level() > GpuLevel::WebGl { store::WIDTH * keyed::LISTED_BYTES } else { 0 };
-        let in_first = store::most_in_chunk(&self.gpu) / store::WIDTH;
-        let rows = match room / (store::ROW_BYTES + listed) {
-            rows if rows <= in_first => rows,
-            _ => (room - in_first * listed) / store::ROW_BYTES,
+        let row = store::ROW_BYTES + (STRIDE * store::WIDTH).div_ceil(keyed::LEAST_IN_SLICE);
+        let in_list = keyed::MOST_IN_SLICE / store::WIDTH;
+        let rows = match room / (row + listed) {
+            rows if rows <= in_list => rows,
+            _ => (room - in_list * listed) / row,
         };
         (rows * store::WIDTH).min(NAMES)
     }
@@ -201,8 +164,17 @@ impl Renderer {
     /// [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
     /// [`RenderError::DeviceLost`]: [`Renderer::recover`].
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), RenderError> {
-        self.submit(frame, false)?;
+        self.submit(frame, false, None)?;
         self.survive(self.gpu.wait())
+    }
+
+    /// [`Renderer::draw`], broken off some milliseconds after `interrupt` is set: then false, and the picture is still the one before.
+    ///
+    /// # Errors
+    /// As for [`Renderer::draw`].
+    pub fn draw_interruptible(&mut self, frame: &Frame<'_>, interrupt: &Interrupt) -> Result<bool, RenderError> {
+        let drawn = self.submit(frame, false, Some(interrupt))?;
+        self.survive(self.gpu.wait()).map(|()| drawn)
     }
 
     /// Draws the last frame once more from what lies on the device, without sending anything: for a window that was covered, or
@@ -215,7 +187,7 @@ impl Renderer {
         if self.last.is_none() {
             return Ok(false);
         }
-        let drawn = self.submit_last().and_then(|()| self.gpu.wait());
+        let drawn = self.submit_last(None).and_then(|_| self.gpu.wait());
         self.survive(drawn).map(|()| true)
     }
 
@@ -231,27 +203,24 @@ impl Renderer {
     /// # Errors
     /// As for [`Renderer::draw`].
     pub fn picture(&mut self, frame: &Frame<'_>) -> Result<Picture, RenderError> {
-        self.submit(frame, true)?;
+        self.submit(frame, true, None)?;
         let read = self.read();
         self.survive(read)
     }
 
-    fn read(&self) -> Result<Picture, RenderError> {
+    /// What was submitted with readback.
+    pub(crate) fn read(&self) -> Result<Picture, RenderError> {
         let targets = self.targets.as_ref().expect("a frame was submitted");
-        let through = &self.buffers.readback;
-        let rgba = read_texture(&self.gpu, &targets.picture, 4, through)?;
-        let depth = read_texture(&self.gpu, &targets.gbuffer.depth, 4, through)?;
-        let normal = read_texture(&self.gpu, &targets.gbuffer.normal, 8, through)?;
-        Ok(Picture {
-            size: targets.gbuffer.size,
-            rgba,
-            depth: depth.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(),
-            footprint_px: normal.as_chunks::<8>().0.iter().map(|pixel| f32_of_f16([pixel[6], pixel[7]])).collect(),
-        })
+        targets.read(&self.gpu, &self.buffers.readback)
     }
 
-    /// Checks a frame, makes room, uploads, and hands it to the device.
-    fn submit(&mut self, frame: &Frame<'_>, read_back: bool) -> Result<(), RenderError> {
+    /// Checks a frame, makes room, uploads, and hands it to the device. False where that was broken off.
+    pub(crate) fn submit(
+        &mut self,
+        frame: &Frame<'_>,
+        read_back: bool,
+        interrupt: Option<&Interrupt>,
+    ) -> Result<bool, RenderError> {
         self.gpu.check()?;
         let (size, kernel) = (frame.camera.size, frame.look.kernel);
         let limit = self.gpu.max_picture_edge();
@@ -271,20 +240,24 @@ impl Renderer {
             return Err(RenderError::TooMany(splats));
         }
         self.last = None;
-        let drawn = self.send(frame, &lists, read_back).and_then(|()| self.submit_last());
+        let sent = self.send(frame, &lists, read_back, interrupt);
+        let drawn = sent.and_then(|sent| if sent { self.submit_last(interrupt) } else { Ok(false) });
         self.survive(drawn)
     }
 
-    /// Makes room and uploads.
+    /// Makes room and uploads. False where that was broken off.
     fn send(
         &mut self,
         frame: &Frame<'_>,
         lists: &[(Similarity, &SplatList)],
         read_back: bool,
-    ) -> Result<(), RenderError> {
+        interrupt: Option<&Interrupt>,
+    ) -> Result<bool, RenderError> {
         let (camera, kernel) = (&frame.camera, frame.look.kernel);
         let most = store::most_in_chunk(&self.gpu);
-        let plan = Plan::new(camera, lists, most);
+        let splats = lists.iter().map(|(_, list)| list.len() as u64).sum();
+        let area_px = lists.iter().map(|(placement, list)| list.area_px(&ModelView::new(camera, placement))).sum();
+        let plan = Plan::new(camera, lists, most, keyed::most_in_slice(splats, area_px));
         let bands = self.bands(camera.size, kernel);
         let keyed = self.gpu.level() > GpuLevel::WebGl;
         let passes = if keyed {
@@ -294,52 +267,54 @@ impl Renderer {
         };
         self.make_room(camera.size, kernel, &plan, passes.len() as u64, read_back)?;
         let Self { gpu, staging, buffers, uploaded_bytes, .. } = self;
-        store::upload(gpu, staging, &buffers.chunks, most, lists)?;
+        if !store::upload(gpu, staging, &buffers.chunks, most, lists, interrupt)? {
+            return Ok(false);
+        }
         staging.write(gpu, buffers.passes.buffer(), 0, &passes)?;
         staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&plan.parts))?;
         let light = LightPass::params(camera, &frame.look.lighting);
         staging.write(gpu, buffers.light.buffer(), 0, bytemuck::bytes_of(&light))?;
         staging.finish(gpu)?;
         *uploaded_bytes = staging.take_written_bytes();
-        let area_px = lists.iter().map(|(placement, list)| list.area_px(&ModelView::new(camera, placement))).sum();
         let rounds = keyed::rounds(gpu, camera.size, kernel, area_px);
-        let resolving = Resolving { many_parts: plan.has_many_parts(), footprint: read_back };
+        let resolving = Resolving { is_shared: plan.is_shared(), footprint: read_back };
         self.last = Some(OnDevice { kernel, rounds, resolving, bands, plan });
-        Ok(())
+        Ok(true)
     }
 
-    /// Hands what lies on the device to the device.
-    fn submit_last(&mut self) -> Result<(), RenderError> {
+    /// Draws what lies on the device. False where that was broken off.
+    fn submit_last(&mut self, interrupt: Option<&Interrupt>) -> Result<bool, RenderError> {
         let Self { gpu, buffers, targets, .. } = self;
         let OnDevice { kernel, rounds, resolving, bands, plan } = self.last.as_ref().expect("just sent, or asked for");
         let Targets { gbuffer, picture } = targets.as_ref().expect("made with the room");
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut commands = Commands::new(gpu, interrupt);
         let chunks = &buffers.chunks[..plan.chunks.len()];
         let (kernel, resolving, passes, parts) = (*kernel, *resolving, &buffers.passes, &buffers.parts);
         if chunks.is_empty() {
-            drop(gbuffer.begin(&mut encoder, true));
+            drop(gbuffer.begin(commands.encoder(), true));
         } else if gpu.level() > GpuLevel::WebGl {
             self.keyed_pass.prepare(gpu, kernel, resolving);
             let (bands, buffers) = (*bands, &buffers.keyed);
             let keyed = KeyedFrame { kernel, rounds, resolving, bands, plan, chunks, passes, parts, buffers };
-            self.keyed_pass.encode(gpu, &mut encoder, gbuffer, &keyed);
+            if !self.keyed_pass.encode(gpu, &mut commands, gbuffer, &keyed)? {
+                return Ok(false);
+            }
         } else {
             self.depth_test_pass.prepare(gpu, kernel);
             let splats = DepthTestFrame { kernel, plan, chunks, passes, parts };
-            self.depth_test_pass.encode(gpu, &mut encoder, gbuffer, &splats);
+            self.depth_test_pass.encode(gpu, commands.encoder(), gbuffer, &splats);
         }
         let lit = self.light_pass.bind(&gpu.device, gbuffer, &buffers.light);
         {
             let target = gbuffer::view(picture);
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            let mut pass = commands.encoder().begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("light"),
                 color_attachments: &[Some(gbuffer::attachment(&target, true, wgpu::Color::TRANSPARENT))],
                 ..Default::default()
             });
             self.light_pass.draw(&mut pass, &lit);
         }
-        gpu.queue.submit([encoder.finish()]);
-        gpu.check()
+        commands.submit().map(|()| true)
     }
 
     /// How a picture is cut up: what is kept for each of its pixels shall fit into a binding, and leave room for splats.
@@ -356,8 +331,9 @@ impl Renderer {
         if self.gpu.level() > GpuLevel::WebGl {
             buffers.keyed.want(&bands, kernel, 0);
         }
-        buffers.want(size, STRIDE * USUAL_PARTS, USUAL_PARTS, true);
-        Staging::BYTES + targets_bytes(size) + buffers.all().map(Pool::least_bytes).sum::<u64>()
+        buffers.want_parts(STRIDE * USUAL_PARTS, USUAL_PARTS);
+        buffers.want_readback(size);
+        Staging::BYTES + Targets::bytes(size) + buffers.least_bytes()
     }
 
     /// Targets of this size, and buffers for a frame; within the budget, or with an error and nothing changed.
@@ -371,31 +347,21 @@ impl Renderer {
     ) -> Result<(), RenderError> {
         let bands = self.bands(size, kernel);
         let keyed = self.gpu.level() > GpuLevel::WebGl;
-        let buffers = &mut self.buffers;
-        buffers.all_mut().iter_mut().for_each(|pool| pool.wanted = 0);
-        if buffers.chunks.len() < plan.chunks.len() {
-            buffers.chunks.resize_with(plan.chunks.len(), Chunk::new);
-        }
-        for (chunk, (parts, splats)) in buffers.chunks.iter_mut().zip(&plan.chunks) {
-            chunk.parts = parts.clone();
-            chunk.want(*splats);
-        }
+        self.buffers.want(pass_bytes, plan);
         if keyed {
-            buffers.keyed.want(&bands, kernel, plan.chunks.iter().map(|(_, splats)| *splats).max().unwrap_or(0));
+            self.buffers.keyed.want(&bands, kernel, plan.largest_chunk());
         }
-        buffers.want(size, pass_bytes, plan.parts.len() as u64, read_back);
-        let other = Staging::BYTES + targets_bytes(size);
+        if read_back {
+            self.buffers.want_readback(size);
+        }
+        let other = Staging::BYTES + Targets::bytes(size);
         let stale = self.targets.take_if(|targets| targets.gbuffer.size != size);
         if let Some(targets) = stale {
             targets.free();
         }
         memory::fit(&self.gpu, &mut self.buffers.all_mut(), other, self.budget)?;
         if self.targets.is_none() {
-            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
-                | wgpu::TextureUsages::COPY_SRC
-                | wgpu::TextureUsages::TEXTURE_BINDING;
-            let picture = self.gpu.create_shown_texture("picture", size, PICTURE, usage);
-            self.targets = Some(Targets { gbuffer: GBuffer::new(&self.gpu.device, size), picture });
+            self.targets = Some(Targets::new(&self.gpu, size));
             self.gpu.check()?;
         }
         Ok(())
@@ -407,8 +373,7 @@ impl Renderer {
             self.last = None;
         }
         if let Err(RenderError::OutOfMemory(_)) = &result {
-            self.buffers.all_mut().into_iter().for_each(Pool::free);
-            self.buffers.chunks.clear();
+            self.buffers.free();
             if let Some(targets) = self.targets.take() {
                 targets.free();
             }
@@ -417,59 +382,5 @@ impl Renderer {
             let _ = self.gpu.check();
         }
         result
-    }
-}
-
-impl Buffers {
-    fn new() -> Self {
-        use wgpu::BufferUsages as Usage;
-        Self {
-            chunks: Vec::new(),
-            keyed: KeyedBuffers::new(),
-            passes: Pool::new("passes", Usage::UNIFORM | Usage::COPY_SRC),
-            parts: Pool::new("parts", Usage::UNIFORM | Usage::STORAGE),
-            light: Pool::new("light", Usage::UNIFORM),
-            readback: Pool::new("readback", Usage::MAP_READ),
-        }
-    }
-
-    /// Asks for room for all but splats and keys.
-    fn want(&mut self, size: ImageSize, pass_bytes: u64, parts: u64, read_back: bool) {
-        self.passes.wanted = pass_bytes;
-        self.parts.wanted = parts.max(1) * STRIDE;
-        self.light.wanted = size_of::<LightParams>() as u64;
-        self.readback.wanted = if read_back { readback::buffer_bytes(size) } else { 0 };
-    }
-
-    fn all(&self) -> impl Iterator<Item = &Pool> {
-        let KeyedBuffers { keys, found, sums, list, draw } = &self.keyed;
-        let chunks = self.chunks.iter().flat_map(|chunk| [&chunk.balls, &chunk.normal_colors]);
-        [keys, found, sums, list, draw, &self.passes, &self.parts, &self.light, &self.readback]
-            .into_iter()
-            .chain(chunks)
-    }
-
-    fn all_mut(&mut self) -> Vec<&mut Pool> {
-        let KeyedBuffers { keys, found, sums, list, draw } = &mut self.keyed;
-        let chunks = self.chunks.iter_mut().flat_map(|chunk| [&mut chunk.balls, &mut chunk.normal_colors]);
-        [keys, found, sums, list, draw, &mut self.passes, &mut self.parts, &mut self.light, &mut self.readback]
-            .into_iter()
-            .chain(chunks)
-            .collect()
-    }
-}
-
-fn targets_bytes(size: ImageSize) -> u64 {
-    // The G-buffer and the picture.
-    GBuffer::bytes(size) + size.pixels() as u64 * 4
-}
-
-/// IEEE 754 half to single precision; finite and positive numbers are all that is stored here.
-fn f32_of_f16(bytes: [u8; 2]) -> f32 {
-    let half = u16::from_le_bytes(bytes);
-    let (exponent, fraction) = (half >> 10 & 31, f32::from(half & 1023) / 1024.0);
-    match exponent {
-        0 => fraction * 2f32.powi(-14),
-        _ => (1.0 + fraction) * 2f32.powi(i32::from(exponent) - 15),
     }
 }

@@ -210,11 +210,19 @@ impl Stage {
             self.scene.serve();
             return;
         }
-        let drawn = self.renderer.draw(&frame);
+        let drawn = if moved {
+            self.renderer.draw(&frame).map(|()| true)
+        } else {
+            self.renderer.draw_interruptible(&frame, self.mailbox.interrupt())
+        };
         self.scene.serve();
-        if let Err(error) = drawn {
-            self.survive(error, &report);
-            return;
+        match drawn {
+            Ok(true) => {}
+            Ok(false) => return,
+            Err(error) => {
+                self.survive(error, &report);
+                return;
+            }
         }
         let frame_ms = (begun.elapsed() - waited).as_secs_f64() * 1e3;
         self.control.drew(frame_ms, &report, self.scene.residency().is_loading());

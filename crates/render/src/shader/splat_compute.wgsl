@@ -1,6 +1,6 @@
 // splat_compute.wgsl: draws small splats into the keys of a band, and lists the large ones.
 //
-// Dispatch  the splats of one part, up to EACH an invocation, in rows of ROW workgroups.
+// Dispatch  the splats of one part, up to EACH an invocation.
 // Reads     frame, part; balls; normals and colours where the kernel needs them.
 // Writes    keys (and sums); list of large splats and how many there are (`DrawIndirectArgs`).
 // Limits    none beyond the baseline of WebGPU with 32-bit keys; 64-bit ones need `SHADER_INT64_ATOMIC_MIN_MAX`.
@@ -29,9 +29,8 @@ var<private> part: PartParams;
 #import splat_nearness.wgsl
 #import splat_target.wgsl
 
-// Workgroups in a row of the dispatch, invocations in a workgroup, splats that one invocation draws one after the other: starting
-// an invocation costs as much as drawing a small splat.
-const ROW: u32 = 32768u;
+// Invocations in a workgroup, splats that one invocation draws one after the other: starting an invocation costs as much as
+// drawing a small splat.
 const GROUP: u32 = 64u;
 const EACH: u32 = 16u;
 
@@ -59,7 +58,7 @@ fn draw_small(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     frame = frame_params;
     part = part_params;
     // Neighbours in memory are drawn by neighbours in the workgroup.
-    let first = (group.y * ROW + group.x) * (GROUP * EACH);
+    let first = group.x * (GROUP * EACH);
     // A bit for each large one. They are listed together, because a processor that runs invocations in lockstep takes its time
     // for each atomic operation, whether or not any of them gets there.
     var large = 0u;

@@ -15,8 +15,8 @@
 // Inverted number, nearness; in rows as long as those of the store.
 @group(0) @binding(9) var found: texture_2d<u32>;
 
-// True where there are several parts to tell apart: rare, and slow on some devices.
-override many_parts: bool = true;
+// True where splats of several instances are to be told apart: rare, and slow on some devices.
+override is_shared: bool = true;
 // True where extents of splats are wanted too.
 override wants_footprint: bool = true;
 
@@ -42,7 +42,7 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     let normal_code = normal_color & 0x3fffu;
     var normal: vec3f;
     var footprint_px = 0.0;
-    if many_parts {
+    if is_shared {
         let found = part_of_slot(slot);
         normal = normal_in_world(parts[found], normal_code);
         if wants_footprint {

@@ -48,7 +48,7 @@ impl DepthTestPass {
         let (pipeline, layout) = &self.pipelines[&kernel];
         let mut pass = gbuffer.begin(encoder, true);
         pass.set_pipeline(pipeline);
-        for chunk in chunks {
+        for (chunk, planned) in chunks.iter().zip(&plan.chunks) {
             let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("splats"),
                 layout,
@@ -59,7 +59,7 @@ impl DepthTestPass {
                     chunk.normal_colors.entry(3),
                 ],
             });
-            for index in chunk.parts.clone() {
+            for index in planned.parts.clone() {
                 pass.set_bind_group(0, &bound, &[index * STRIDE as u32]);
                 pass.draw(0..4, 0..plan.parts[index as usize].count);
             }

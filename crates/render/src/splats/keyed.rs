@@ -5,18 +5,21 @@
 //! would keep a single invocation busy, so it is listed and drawn as a quad. Both deliver the same bits to the same place, and
 //! maxima and sums of whole numbers do not depend on the order: which way a splat takes is never to be seen.
 //!
-//! A picture whose keys do not fit into one binding is drawn in bands of rows.
+//! A picture whose keys do not fit into one binding is drawn in bands of rows; splats are drawn in slices, between which a frame
+//! can be broken off.
 
-use crate::Gpu;
+use crate::commands::Commands;
 use crate::gbuffer::{self, GBuffer};
 use crate::memory::Pool;
 use crate::shader::Target;
 use crate::splats::Kernel;
 use crate::splats::params::{PartParams, PassParams, STRIDE};
 use crate::splats::pipelines::{Pipelines, Resolving, Round, target};
-use crate::splats::store::{self, Chunk, Plan};
+use crate::splats::store::{self, Chunk, Plan, PlannedChunk};
+use crate::{Gpu, RenderError};
 use gigalod_geom::{Camera, ImageSize};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Splats whose window is at most this many pixels wide and high are drawn by the compute pass, unless
 /// [`crate::Renderer::set_compute_extent`] says otherwise. Measured on the software adapter, for which a fragment costs more than
@@ -36,11 +39,22 @@ const SUMS_BYTES: u64 = 40;
 /// Bytes of a row of the texture that keys are copied to: processors read textures faster than buffers.
 const KEYS_ROW_BYTES: u64 = store::WIDTH * KEY_BYTES;
 
-/// Bytes of a large splat in the list.
+/// Bytes of a large splat in the list, which has room for all of a slice.
 pub(crate) const LISTED_BYTES: u64 = 4;
 
-/// `ROW` of splat_compute.wgsl, and splats that a workgroup draws.
-const GROUPS_IN_ROW: u32 = 1 << 15;
+/// Splats of a slice.
+pub(crate) const MOST_IN_SLICE: u64 = 1 << 17;
+pub(crate) const LEAST_IN_SLICE: u64 = 1 << 13;
+/// Pixels that the splats of a slice cover, each counted by itself.
+const SLICE_PX: f64 = 1e6;
+
+/// How many splats to draw in one go: the software adapter takes some 5 ms for them. `area_px` is the area of all splats together.
+pub(crate) fn most_in_slice(splats: u64, area_px: f64) -> u64 {
+    let with_that_area = (splats as f64 * (SLICE_PX / area_px.max(1.0))) as u64;
+    with_that_area.clamp(LEAST_IN_SLICE, MOST_IN_SLICE).next_multiple_of(u64::from(SPLATS_IN_GROUP))
+}
+
+/// Splats that a workgroup draws: `GROUP` times `EACH` of splat_compute.wgsl.
 const SPLATS_IN_GROUP: u32 = 64 * 16;
 
 /// How a frame is cut up.
@@ -67,7 +81,7 @@ impl Bands {
         [keys, if kernel.is_gauss() { pixels * SUMS_BYTES } else { 0 }]
     }
 
-    fn rows_of(&self, band: u32) -> std::ops::Range<u32> {
+    fn rows_of(&self, band: u32) -> Range<u32> {
         band * self.rows..((band + 1) * self.rows).min(self.height)
     }
 }
@@ -96,11 +110,11 @@ impl KeyedBuffers {
     }
 
     /// Asks for room.
-    pub(crate) fn want(&mut self, bands: &Bands, kernel: Kernel, most_in_chunk: u64) {
+    pub(crate) fn want(&mut self, bands: &Bands, kernel: Kernel, largest_chunk: u64) {
         [self.keys.wanted, self.sums.wanted] = bands.bytes(kernel);
         self.found.wanted = if kernel.is_gauss() { 0 } else { self.keys.wanted };
-        // All of a chunk may be large.
-        self.list.wanted = most_in_chunk.max(1) * LISTED_BYTES;
+        // All of a slice may be large.
+        self.list.wanted = largest_chunk.clamp(1, MOST_IN_SLICE) * LISTED_BYTES;
         self.draw.wanted = 16;
     }
 
@@ -173,7 +187,7 @@ pub(crate) fn pass_bytes(
     for band in 0..bands.count {
         let rows = bands.rows_of(band);
         for phase in 0..phases(gpu, kernel) {
-            for (parts, splats) in &plan.chunks {
+            for PlannedChunk { parts, splats, .. } in &plan.chunks {
                 let params = PassParams {
                     first_row: rows.start,
                     end_row: rows.end,
@@ -203,14 +217,18 @@ impl KeyedPass {
         pipelines.prepare(gpu, rounds, resolving);
     }
 
-    /// Draws all splats of a frame into a G-buffer, which it clears. The kernel has been prepared, and there is a splat.
+    /// Draws all splats of a frame into a G-buffer, which it clears. The kernel has been prepared, and there is a splat. False where it
+    /// was broken off; then the G-buffer is as it was, or partly so.
+    ///
+    /// # Errors
+    /// What the device says.
     pub(crate) fn encode(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        commands: &mut Commands<'_>,
         gbuffer: &GBuffer,
         frame: &KeyedFrame<'_>,
-    ) {
+    ) -> Result<bool, RenderError> {
         let pipelines = &self.pipelines[&frame.kernel];
         let bound: Vec<[wgpu::BindGroup; 3]> =
             frame.chunks.iter().map(|chunk| bind(gpu, pipelines, frame, chunk)).collect();
@@ -219,64 +237,93 @@ impl KeyedPass {
         let pass_at = |band: u32, phase: u32, chunk: u32| (band * phases + phase) * chunks + chunk;
         let draw_template = u64::from(pass_at(frame.bands.count, 0, 0)) * STRIDE;
         let offset = |index: u32| index * STRIDE as u32;
-        let depth_test = gbuffer::view(&gbuffer.depth_test);
         for band in 0..frame.bands.count {
             let rows = frame.bands.rows_of(band);
             let [keys, sums] = frame.bands.bytes(frame.kernel);
-            encoder.clear_buffer(frame.buffers.keys.buffer(), 0, Some(keys));
+            commands.encoder().clear_buffer(frame.buffers.keys.buffer(), 0, Some(keys));
             if sums > 0 {
-                encoder.clear_buffer(frame.buffers.sums.buffer(), 0, Some(sums));
+                commands.encoder().clear_buffer(frame.buffers.sums.buffer(), 0, Some(sums));
             }
             for (phase, chunk) in (0..phases).flat_map(|phase| (0..chunks).map(move |chunk| (phase, chunk))) {
-                let draw = frame.buffers.draw.buffer();
-                encoder.copy_buffer_to_buffer(frame.passes.buffer(), draw_template, draw, 0, 16);
                 let pass_offset = offset(pass_at(band, phase, chunk));
-                let [for_compute, for_quads, _] = &bound[chunk as usize];
-                let parts = frame.chunks[chunk as usize].parts.clone();
                 for round in frame.rounds {
                     if *round == Round::Rest {
-                        frame.buffers.find(encoder, keys);
+                        frame.buffers.find(commands.encoder(), keys);
                     }
-                    let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                        label: Some("small splats"),
-                        ..Default::default()
-                    });
-                    pass.set_pipeline(pipelines.compute(*round));
-                    for part in parts.clone() {
-                        let groups = frame.plan.parts[part as usize].count.div_ceil(SPLATS_IN_GROUP);
-                        pass.set_bind_group(0, for_compute, &[pass_offset, offset(part)]);
-                        pass.dispatch_workgroups(groups.min(GROUPS_IN_ROW), groups.div_ceil(GROUPS_IN_ROW), 1);
+                    for slice in &frame.plan.chunks[chunk as usize].slices {
+                        let (bound, parts) = (&bound[chunk as usize], slice.clone());
+                        let slice = Slice { round: *round, parts, pass_offset, draw_template, bound };
+                        slice.encode(commands.encoder(), pipelines, gbuffer, frame);
+                        if !commands.goes_on()? {
+                            return Ok(false);
+                        }
                     }
                 }
-                // A pass must have an attachment; this one is not touched.
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("large splats"),
-                    depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                        view: &depth_test,
-                        depth_ops: None,
-                        stencil_ops: None,
-                    }),
-                    ..Default::default()
-                });
-                pass.set_pipeline(&pipelines.quads);
-                pass.set_bind_group(0, for_quads, &[pass_offset]);
-                pass.draw_indirect(draw, 0);
             }
             if !frame.kernel.is_gauss() {
-                frame.buffers.find(encoder, keys);
+                frame.buffers.find(commands.encoder(), keys);
             }
-            let mut pass = gbuffer.begin(encoder, band == 0);
+            let mut pass = gbuffer.begin(commands.encoder(), band == 0);
             pass.set_pipeline(pipelines.resolve(frame.resolving));
             pass.set_scissor_rect(0, rows.start, frame.bands.width, rows.end - rows.start);
             // Sums are of all chunks.
             let resolved = if frame.kernel.is_gauss() { 1 } else { chunks };
             for chunk in 0..resolved {
-                let offsets = [offset(pass_at(band, 0, chunk)), offset(frame.chunks[chunk as usize].parts.start)];
+                let offsets = [offset(pass_at(band, 0, chunk)), offset(frame.plan.chunks[chunk as usize].parts.start)];
                 let offsets = if frame.kernel.is_gauss() { &offsets[..1] } else { &offsets[..] };
                 pass.set_bind_group(0, &bound[chunk as usize][2], offsets);
                 pass.draw(0..3, 0..1);
             }
         }
+        Ok(true)
+    }
+}
+
+/// What is drawn in one go: small splats, and then the large ones among them.
+struct Slice<'a> {
+    round: Round,
+    parts: Range<u32>,
+    /// Of its [`PassParams`].
+    pass_offset: u32,
+    /// What the draw of large splats begins with, in the buffer of passes.
+    draw_template: u64,
+    bound: &'a [wgpu::BindGroup; 3],
+}
+
+impl Slice<'_> {
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipelines: &Pipelines,
+        gbuffer: &GBuffer,
+        frame: &KeyedFrame<'_>,
+    ) {
+        let [for_compute, for_quads, _] = self.bound;
+        let draw = frame.buffers.draw.buffer();
+        encoder.copy_buffer_to_buffer(frame.passes.buffer(), self.draw_template, draw, 0, 16);
+        {
+            let mut pass = encoder
+                .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("small splats"), ..Default::default() });
+            pass.set_pipeline(pipelines.compute(self.round));
+            for part in self.parts.clone() {
+                let groups = frame.plan.parts[part as usize].count.div_ceil(SPLATS_IN_GROUP);
+                pass.set_bind_group(0, for_compute, &[self.pass_offset, part * STRIDE as u32]);
+                pass.dispatch_workgroups(groups, 1, 1);
+            }
+        }
+        // A pass must have an attachment; this one is not touched.
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("large splats"),
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &gbuffer::view(&gbuffer.depth_test),
+                depth_ops: None,
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipelines.quads);
+        pass.set_bind_group(0, for_quads, &[self.pass_offset]);
+        pass.draw_indirect(draw, 0);
     }
 }
 

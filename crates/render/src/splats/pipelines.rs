@@ -27,8 +27,8 @@ pub(crate) enum Round {
 /// What resolving has to tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Resolving {
-    /// Chunks have several parts.
-    pub(crate) many_parts: bool,
+    /// Chunks hold splats of several instances.
+    pub(crate) is_shared: bool,
     /// Extents of splats are wanted too.
     pub(crate) footprint: bool,
 }
@@ -147,7 +147,7 @@ impl Pipelines {
             ("splat_blend.wgsl", BLEND)
         } else {
             // A pass may be given only what it declares.
-            constants.push(("many_parts", set(resolving.many_parts)));
+            constants.push(("is_shared", set(resolving.is_shared)));
             constants.push(("wants_footprint", set(resolving.footprint)));
             ("splat_resolve.wgsl", RESOLVE)
         };
