@@ -30,6 +30,9 @@ const SAMPLE: usize = 500;
 /// A window that takes longer to paint, or is hidden, is not waited for.
 const LONGEST_PAINTING: Duration = Duration::from_millis(30);
 
+/// Weight of the last frame in how long painting takes.
+const PAINTING_GAIN: f64 = 0.2;
+
 /// How often pages that are being loaded are looked for, while there is nothing else to do.
 const LOOK_FOR_PAGES: Duration = Duration::from_millis(4);
 
@@ -47,6 +50,8 @@ pub(crate) struct Stage {
     scene: Scene,
     instances: BTreeMap<ModelKey, Vec<InstanceId>>,
     control: FrameRate,
+    /// How long the window paints while the camera moves, in the mean of the last frames.
+    painting_ms: f64,
     wish: Option<(u64, Wish)>,
     /// What the last finished frame shows.
     drawn: Option<Drawn>,
@@ -75,6 +80,7 @@ impl Stage {
             scene,
             instances: BTreeMap::new(),
             control: FrameRate::new(settings.target_ms, settings.finest_px).with_larger_pixels(),
+            painting_ms: 0.0,
             wish: None,
             drawn: None,
             changed: true,
@@ -177,6 +183,7 @@ impl Stage {
     fn frame(&mut self, number: u64, wish: &Wish) {
         let (begun, cpu_begun) = (Instant::now(), thread_cpu_ms());
         let moved = self.changed;
+        self.control.share(self.painting_ms);
         let wanted = self.control.next(moved);
         let room = self.renderer.most_splats(wish.camera.size, wish.look.kernel);
         let fineness = Fineness { most_splats: wanted.most_splats.min(self.most_splats).min(room), ..wanted };
@@ -205,6 +212,9 @@ impl Stage {
         let waited = Instant::now();
         self.mailbox.wait_until_painted(LONGEST_PAINTING);
         let waited = waited.elapsed();
+        if moved {
+            self.painting_ms += PAINTING_GAIN * (waited.as_secs_f64() * 1e3 - self.painting_ms);
+        }
         if !moved && self.mailbox.interrupt().is_set() {
             // Something else is wished for; what would be drawn in detail is not what a person waits for.
             self.scene.serve();
