@@ -68,7 +68,9 @@ fn main() -> Result<()> {
             figures.tightest = figures.tightest.max(measured / claimed);
             figures.false_claims += u64::from(measured > claimed + ROUNDING_PX);
         }
-        eprintln!("{index} {place:?} {:?} {threshold_px} px: {measured:.2} of {claimed:.2} px", KERNELS[which]);
+        let (holes, fat) = (verdict.holes.len(), verdict.fat.len());
+        let errors = format!("{measured:.2} of {claimed:.2} px, {holes} holes, {fat} fat");
+        eprintln!("{index} {place:?} {:?} {threshold_px} px: {errors}", KERNELS[which]);
     }
     let of_kernel = |(kernel, figures): (Kernel, &Figures)| {
         let Figures { frames, holes, fat, false_claims, tightest } = figures;

@@ -7,7 +7,8 @@
 //!   more than the threshold's footprint there: `threshold_px * depth / focal_px` model units. So a crack that shows the
 //!   model's own back wall is a hole. Pixels beside a [depth discontinuity](crate::discontinuity) are not judged.
 //! * *Fat* is a pixel that is drawn although the model touches no pixel within one pixel plus the threshold (or plus what the
-//!   frame says it drew there, where the data end), between pixel centres.
+//!   frame says it drew there, where the data end), between pixel centres. What lies beyond the picture's edge may be the
+//!   model too: nobody looked.
 
 use crate::discontinuity::away_from_discontinuities;
 use crate::distance_transform::squared_distance_px;
@@ -110,10 +111,14 @@ fn deepest_around(truth: &Truth, index: usize, threshold_px: f64) -> f64 {
 
 fn find_fat(truth: &Truth, touched: &Mask, drawn: &Drawn, threshold_px: f64) -> Vec<[u32; 2]> {
     let away_squared = squared_distance_px(touched);
+    let size = truth.camera.size;
     let is_fat = |&index: &usize| {
+        let [x, y] = truth.pixel(index);
+        let to_edge_px = f64::from((x + 1).min(y + 1).min(size.width - x).min(size.height - y));
         let data_footprint_px = drawn.data_footprint_px.map_or(0.0, |footprint| f64::from(footprint[index]));
         let reach_px = 1.0 + threshold_px.max(data_footprint_px);
-        drawn.depth[index] != f32::INFINITY && away_squared[index] > reach_px * reach_px
+        let reaches_something = away_squared[index] <= reach_px * reach_px || to_edge_px <= reach_px;
+        drawn.depth[index] != f32::INFINITY && !reaches_something
     };
     (0..drawn.depth.len()).filter(is_fat).map(|index| truth.pixel(index)).collect()
 }
@@ -281,5 +286,16 @@ mod tests {
         let (depth, footprint) = (disc(9), vec![2.0; 64 * 64]);
         let drawn = Drawn { depth: &depth, data_footprint_px: Some(&footprint) };
         assert!(judge(&truth, &touched, &drawn, 0.5).is_clean());
+    }
+
+    #[test]
+    fn what_is_drawn_beside_the_pictures_edge_may_belong_to_what_lies_beyond_it() {
+        let (truth, _) = traced(&Mesh::new(vec![], None, None, vec![]).unwrap());
+        let touched = truth.silhouette();
+        // A row of pixels from the left edge on.
+        let depth: Vec<f32> =
+            (0..64 * 64).map(|i| if i / 64 == 32 && i % 64 < 9 { 9.0 } else { f32::INFINITY }).collect();
+        // Column 3 is 4 pixels away from what lies beyond, and column 4 is 5.
+        assert_eq!(judged(&truth, &touched, &depth, 3.0).fat, (4..9).map(|x| [x, 32]).collect::<Vec<_>>());
     }
 }
