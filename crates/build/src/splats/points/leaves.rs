@@ -19,7 +19,7 @@ use std::io;
 /// All but so many hundredths of the points are not larger than the size that others are measured by;
 const MANY: u64 = 1;
 /// nothing is larger than so many times that: scattered noise, far from all and from itself, would be.
-const MOST_TIMES: f32 = 4.0;
+const MOST_TIMES: f32 = 3.0;
 
 /// Leaves of all points, in the order of cells.
 pub(in super::super) fn from_fits(
