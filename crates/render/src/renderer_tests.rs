@@ -28,7 +28,7 @@ fn wall(splats: usize, hue: u32) -> DrawSource {
         let (x, y) = ((at % 190) as f32 / 100.0 - 0.95, (at / 190 % 110) as f32 / 100.0 - 0.55);
         let radius = if at % 100 == 0 { 0.4 } else { 0.02 };
         let ball = SplatBall { center_in_eye: [x, y, -1.5 + at as f32 * 1e-6], radius };
-        piece.push(ball, u32::from(normal::encode(Vec3::Z)) | (at as u32 % 0xfff | hue) << 16);
+        piece.push(ball, u32::from(normal::encode(Vec3::Z)) | ((at as u32 % 0xfff) | hue) << 16);
     }
     DrawSource::Splats(SplatList { pieces: vec![piece] })
 }
