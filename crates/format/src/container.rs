@@ -30,6 +30,8 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 pub enum Kind {
     /// Bounding spheres: [`crate::splats`].
     Splats,
+    /// An octree of triangles and points: [`crate::hybrid`].
+    Hybrid,
 }
 
 impl Kind {
@@ -37,12 +39,14 @@ impl Kind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Splats => "splats",
+            Self::Hybrid => "hybrid",
         }
     }
 
     fn code(self) -> u32 {
         match self {
             Self::Splats => 1,
+            Self::Hybrid => 2,
         }
     }
 }
@@ -114,10 +118,10 @@ impl Container {
         if unknown != 0 {
             return Err(FormatError::Feature { name: format!("feature bit {}", unknown.trailing_zeros()) });
         }
-        if kind_code != Kind::Splats.code() {
+        let Some(kind) = [Kind::Splats, Kind::Hybrid].into_iter().find(|kind| kind.code() == kind_code) else {
             let found = format!("representation {kind_code}");
-            return Err(FormatError::Kind { found, expected: "representation 1 (splats)".into() });
-        }
+            return Err(FormatError::Kind { found, expected: "1 (splats) or 2 (hybrid)".into() });
+        };
         if file_bytes != store.len() {
             return Err(truncated("the file, by its header,", file_bytes, store.len()));
         }
@@ -130,12 +134,20 @@ impl Container {
         if pages_offset > file_bytes {
             return Err(truncated("the first page", pages_offset, file_bytes));
         }
-        Ok(Self { store, kind: Kind::Splats, skeleton, metadata, pages_offset })
+        Ok(Self { store, kind, skeleton, metadata, pages_offset })
     }
 
     /// Which representation it holds.
     pub fn kind(&self) -> Kind {
         self.kind
+    }
+
+    /// Refuses a file of another representation.
+    pub(crate) fn expect_kind(&self, expected: Kind) -> Result<(), FormatError> {
+        if self.kind == expected {
+            return Ok(());
+        }
+        Err(FormatError::Kind { found: self.kind.name().into(), expected: expected.name().into() })
     }
 
     /// Where its bytes lie.

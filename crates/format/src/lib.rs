@@ -10,6 +10,7 @@
 mod bytes;
 mod container;
 mod error;
+pub mod hybrid;
 mod metadata;
 pub mod splats;
 pub mod store;

@@ -21,7 +21,7 @@ pub use page::{Page, WordIndex};
 pub use skeleton::{PageId, PageRecord, Root, Skeleton};
 
 use crate::container::{Section, read_checked};
-use crate::{Container, FormatError};
+use crate::{Container, FormatError, Kind};
 
 /// An open splat file: the skeleton is in memory, pages are read one by one.
 #[derive(Debug, Clone)]
@@ -36,6 +36,7 @@ impl SplatFile {
     /// # Errors
     /// Damage is an error here: without its skeleton a file cannot be drawn at all.
     pub fn open(container: Container) -> Result<Self, FormatError> {
+        container.expect_kind(Kind::Splats)?;
         let bytes = container.read_skeleton()?;
         let skeleton = Skeleton::parse(&bytes, container.pages_offset(), container.store().len())?;
         Ok(Self { container, skeleton })
