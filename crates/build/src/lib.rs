@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+pub mod hybrid;
 mod input;
 mod journal;
 mod output;

@@ -1,0 +1,114 @@
+//! The octree of what fits into memory, from the bottom up.
+//!
+//! In: triangles of one cell. Out: all nodes of that cell and below, and the cell's patch, for the node above.
+//!
+//! The paper gathers what was simplified two levels below. Here a node gathers its children's patches, whose faces carry their own proven
+//! errors, and goes on from there: half the work, and no error is counted that there is not.
+
+use super::cell::{Cell, MOST_LEVEL};
+use super::patch::{Face, Patch, Vertex};
+use super::round::{self, Made};
+use super::simplify::{Limit, simplify};
+use super::{Shape, weld, zip};
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// A triangle with all that belongs to it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct Piece {
+    /// Of its corners; local space.
+    pub(super) at: [[f32; 3]; 3],
+    /// Octahedral, 16 bits for each coordinate.
+    pub(super) normals: [[u16; 2]; 3],
+    /// Red, green, blue, 0.
+    pub(super) colors: [[u8; 4]; 3],
+}
+
+impl Piece {
+    /// Where it lies: the middle of its corners.
+    pub(super) fn middle(&self) -> DVec3 {
+        self.at.iter().map(|at| Vec3::from_array(*at).as_dvec3()).sum::<DVec3>() / 3.0
+    }
+}
+
+/// A cell that is done.
+pub(super) struct Raised {
+    pub(super) patch: Patch,
+    /// Of the cell and all below.
+    pub(super) nodes: Vec<Made>,
+}
+
+/// Raises a cell.
+pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape) -> Raised {
+    if pieces.len() <= shape.most_triangles || cell.level == MOST_LEVEL {
+        return leaf(&pieces, cell, shape);
+    }
+    let sets = split(&pieces, cell, shape);
+    drop(pieces);
+    let children: Vec<Raised> = sets
+        .into_par_iter()
+        .enumerate()
+        .filter(|(_, pieces)| !pieces.is_empty())
+        .map(|(octant, pieces)| raise(pieces, cell.child(octant as u8), shape))
+        .collect();
+    join(children, cell, shape)
+}
+
+/// Pieces of each eighth, in their order.
+pub(super) fn split(pieces: &[Piece], cell: Cell, shape: &Shape) -> [Vec<Piece>; 8] {
+    let middle = cell.middle(shape.edge);
+    let mut sets: [Vec<Piece>; 8] = Default::default();
+    for piece in pieces {
+        sets[usize::from(Cell::octant(middle, piece.middle()))].push(*piece);
+    }
+    sets
+}
+
+fn leaf(pieces: &[Piece], cell: Cell, shape: &Shape) -> Raised {
+    let patch = weld::patch_of(pieces);
+    let made = round::round(&patch, cell, shape);
+    Raised { patch, nodes: vec![made] }
+}
+
+/// The node of a cell whose children are done.
+pub(super) fn join(children: Vec<Raised>, cell: Cell, shape: &Shape) -> Raised {
+    let mut nodes = Vec::with_capacity(children.iter().map(|child| child.nodes.len()).sum::<usize>() + 1);
+    let mut patches = Vec::with_capacity(children.len());
+    for mut child in children {
+        nodes.append(&mut child.nodes);
+        patches.push(child.patch);
+    }
+    let limit = shape.limit(cell.level);
+    let mut patch = weld::gather(patches);
+    zip::zip(&mut patch, limit);
+    smooth(&mut patch, limit);
+    let patch = simplify(patch, Limit { error: limit, keeps_looks: shape.keeps_looks });
+    nodes.push(round::round(&patch, cell, shape));
+    Raised { patch, nodes }
+}
+
+/// Normals of vertices of which all triangles are smaller than the error become those of their surroundings: what is too small to be
+/// seen would flicker (hybrid paper, section 3.1).
+fn smooth(patch: &mut Patch, limit: f64) {
+    let Patch { vertices, faces } = patch;
+    let mut is_small = vec![true; vertices.len()];
+    let mut sums = vec![Vec3::ZERO; vertices.len()];
+    let length = |a: &Vertex, b: &Vertex| (a.at - b.at).length();
+    for Face { corners, .. } in faces.iter() {
+        let [a, b, c] = corners.map(|corner| &vertices[corner as usize]);
+        let is_large = length(a, b).max(length(b, c)).max(length(c, a)) >= limit;
+        let doubled = (b.at - a.at).cross(c.at - a.at).length() as f32;
+        let sum = (a.normal + b.normal + c.normal) * doubled;
+        for corner in corners {
+            is_small[*corner as usize] &= !is_large;
+            sums[*corner as usize] += sum;
+        }
+    }
+    for ((vertex, is_small), sum) in vertices.iter_mut().zip(is_small).zip(sums) {
+        if is_small {
+            vertex.normal = sum.try_normalize().unwrap_or(vertex.normal);
+        }
+    }
+}
