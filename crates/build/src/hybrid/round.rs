@@ -1,9 +1,9 @@
 //! From a patch to what a file keeps of it: positions on the level's grid, normals on the octahedron, and how far all that may be off.
 
+use super::Shape;
 use super::cell::Cell;
 use super::patch::{Patch, Vertex, total};
 use super::simplify::up;
-use super::Shape;
 use gigalod_format::hybrid::{NodeRecord, Page};
 use glam::{DVec3, Vec3};
 

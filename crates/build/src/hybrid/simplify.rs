@@ -6,9 +6,10 @@
 //! face that changes stays within the limit, and if what there was still looks alike ([`looks`](super::looks)). So quality and proof are
 //! separate. Everything is decided by numbers of vertices and bits of costs: the same patch gives the same one.
 
+use super::cover::Cover;
 use super::looks::{FaceLook, Looks};
 use super::overlay::{Border, MOST_VERTICES, Overlay, Verdict};
-use super::patch::{Patch, Vertex, total};
+use super::patch::{Face, Patch, Vertex, total};
 use super::quadric::Quadric;
 use super::surface::Surface;
 use glam::DVec3;
@@ -31,6 +32,10 @@ const BORDER_WEIGHT: f64 = 2.0;
 const PLACE_WEIGHT: f64 = 1e-5;
 /// Operations are not tried whose quadric says that planes are so many times the limit away, in the mean of squares.
 const HOPELESS: f64 = 1.0;
+/// Edges longer than so many times the limit are not tried where nothing can be laid flat.
+const COVERED_LENGTH: f64 = 3.0;
+/// Faces around both ends of an edge that are covered at most.
+const MOST_COVERED: usize = 48;
 /// Passes over all edges; each takes what the one before it made possible.
 const MOST_PASSES: usize = 3;
 /// A pass that gains less than this share is the last.
@@ -73,6 +78,7 @@ struct Work {
     looks: Looks,
     queue: BinaryHeap<Candidate>,
     overlay: Overlay,
+    cover: Cover,
     star: Star,
 }
 
@@ -88,6 +94,8 @@ struct Star {
     old: Vec<u32>,
     /// Those of them that stay, in the order of the overlay's new ones.
     changed: Vec<u32>,
+    /// Faces that stay as they are, but for their errors.
+    beside: Vec<u32>,
     looks: Vec<FaceLook>,
     app: Vec<f32>,
     samples: Vec<u32>,
@@ -95,6 +103,23 @@ struct Star {
     places: Vec<(u32, u32)>,
     /// Where vertices go that become samples.
     vertex_places: Vec<(u32, u32)>,
+}
+
+impl Star {
+    /// Faces around what stays that also have another vertex, by its name.
+    fn faces_at_edge(&self, surface: &Surface, other: u8) -> usize {
+        let other = self.names[usize::from(other)];
+        self.of_kept.iter().filter(|face| surface.faces[**face as usize].corners.contains(&other)).count()
+    }
+}
+
+/// What proves an operation.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Laid {
+    /// The overlay.
+    Flat,
+    /// The cover.
+    Covered,
 }
 
 /// What becomes of an edge's ends.
@@ -124,6 +149,7 @@ impl Work {
             looks: Looks::new(faces),
             queue: BinaryHeap::new(),
             overlay: Overlay::default(),
+            cover: Cover::default(),
             star: Star::default(),
             surface,
         };
@@ -246,9 +272,86 @@ impl Work {
         if verdict == Verdict::Unproved && self.on_border[a as usize] == self.on_border[b as usize] {
             verdict = self.try_one(other);
         }
+        if verdict == Verdict::Unproved && self.is_short(a, b) {
+            let operations = [best, plain, other];
+            let first = usize::from(best.moved.is_none());
+            if operations[first..].iter().any(|operation| self.try_covered(*operation)) {
+                verdict = Verdict::Good;
+            }
+        }
         if verdict != Verdict::Good {
             self.failed.insert(u64::from(a) << 32 | u64::from(b), self.clock);
         }
+    }
+
+    fn is_short(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|vertex| self.surface.vertices[vertex as usize].at);
+        (a - b).length() <= COVERED_LENGTH * self.limit.error
+    }
+
+    /// Does an operation that is no exchange of discs, or none that can be laid flat, if it is proved.
+    fn try_covered(&mut self, operation: Operation) -> bool {
+        let Operation { gone, kept, moved } = operation;
+        let Self { surface, cover, star, .. } = self;
+        let Star { of_gone, of_kept, old, changed, beside, .. } = star;
+        for list in [&mut *of_gone, of_kept, old, changed, beside] {
+            list.clear();
+        }
+        surface.around(gone, of_gone);
+        surface.around(kept, of_kept);
+        if of_gone.len() + of_kept.len() > MOST_COVERED {
+            return false;
+        }
+        cover.clear();
+        let at = |vertex: u32| match moved {
+            Some(moved) if vertex == kept || vertex == gone => moved.at,
+            _ => surface.vertices[if vertex == gone { kept } else { vertex } as usize].at,
+        };
+        let others = of_kept.iter().filter(|face| !of_gone.contains(face));
+        for face in of_gone.iter().chain(others) {
+            let Face { corners, geo, .. } = surface.faces[*face as usize];
+            let [has_gone, has_kept] = [gone, kept].map(|vertex| corners.contains(&vertex));
+            let before = (corners.map(|corner| surface.vertices[corner as usize].at), f64::from(geo));
+            if !has_gone && moved.is_none() {
+                cover.beside.push(before);
+                beside.push(*face);
+                continue;
+            }
+            cover.old.push(before);
+            old.push(*face);
+            if !(has_gone && has_kept) {
+                cover.new.push((corners.map(at), 0.0));
+                changed.push(*face);
+            }
+        }
+        if cover.new.is_empty() {
+            return false;
+        }
+        if self.limit.keeps_looks && !self.look(&operation, Laid::Covered) {
+            return false;
+        }
+        if !self.cover.bound(self.limit.error) {
+            return false;
+        }
+        for (face, (_, geo)) in self.star.beside.iter().zip(&self.cover.beside) {
+            let app = self.surface.faces[*face as usize].app;
+            if f64::from(total(up(*geo), app)) > self.limit.error {
+                return false;
+            }
+        }
+        if self.limit.keeps_looks {
+            let star = &self.star;
+            let total = self.cover.new.iter().zip(&star.app).map(|((_, geo), app)| total(up(*geo), *app));
+            if total.into_iter().any(|total| f64::from(total) > self.limit.error) {
+                return false;
+            }
+        }
+        for (face, (_, geo)) in self.star.beside.iter().zip(&self.cover.beside) {
+            let face = &mut self.surface.faces[*face as usize];
+            face.geo = face.geo.max(up(*geo));
+        }
+        self.do_it(&operation, Laid::Covered);
+        true
     }
 
     /// Does an operation if it is proved.
@@ -263,7 +366,7 @@ impl Work {
         if begun != Verdict::Good {
             return begun;
         }
-        if self.limit.keeps_looks && !self.look(&operation) {
+        if self.limit.keeps_looks && !self.look(&operation, Laid::Flat) {
             return Verdict::TooFar;
         }
         let finished = self.overlay.finish(self.limit.error);
@@ -276,7 +379,7 @@ impl Work {
                 return Verdict::TooFar;
             }
         }
-        self.do_it(&operation);
+        self.do_it(&operation, Laid::Flat);
         Verdict::Good
     }
 
@@ -400,8 +503,15 @@ impl Work {
                 }
             }
         }
-        let common = (around_gone & around_kept & !3).count_ones();
-        common == if is_closed { 2 } else { 1 }
+        let common = around_gone & around_kept & !3;
+        match overlay.border {
+            None => common.count_ones() == 2,
+            // The last edge of a hole closes with its other side.
+            Some(Border { before, .. }) if common & 1 << before != 0 => {
+                common.count_ones() == 2 && links > 1 && star.faces_at_edge(surface, before) == 1
+            }
+            Some(_) => common.count_ones() == 1,
+        }
     }
 
     /// The last face at a corner of the border goes; its points move to the edge that another face has.
@@ -410,7 +520,8 @@ impl Work {
         let Self { surface, star, looks, limit, .. } = self;
         let Operation { gone, kept, .. } = *operation;
         let face = surface.faces[ear as usize];
-        let third = face.corners.into_iter().find(|corner| *corner != gone && *corner != kept).expect("no face is degenerate");
+        let third =
+            face.corners.into_iter().find(|corner| *corner != gone && *corner != kept).expect("no face is degenerate");
         let holds = |face: &&u32| **face != ear && surface.faces[**face as usize].corners.contains(&third);
         let Some(other) = star.of_kept.iter().find(holds).copied() else { return false };
         let [from, a, b] = [gone, kept, third].map(|vertex| surface.vertices[vertex as usize].at);
@@ -434,23 +545,40 @@ impl Work {
     }
 
     /// Bounds how far what looks alike has moved; false where that is beyond the limit.
-    fn look(&mut self, operation: &Operation) -> bool {
-        let Self { surface, overlay, star, looks, limit, bases, .. } = self;
-        let vertex = |name: u8| match (operation.moved.as_ref(), name == overlay.apex) {
-            (Some(moved), true) => moved,
-            _ => &surface.vertices[star.names[usize::from(name)] as usize],
+    fn look(&mut self, operation: &Operation, laid: Laid) -> bool {
+        let Self { surface, overlay, cover, star, looks, limit, bases, .. } = self;
+        let Operation { gone, kept, moved } = operation;
+        let corner = |vertex: u32| match moved {
+            Some(moved) if vertex == *kept || vertex == *gone => moved,
+            _ => &surface.vertices[if vertex == *gone { *kept } else { vertex } as usize],
         };
         star.looks.clear();
-        star.looks.extend(overlay.new.iter().map(|face| FaceLook::of(face.map(vertex))));
+        star.looks.extend(star.changed.iter().map(|face| {
+            let corners = surface.faces[*face as usize].corners;
+            // Shares count from the apex where that is flat.
+            let first = match laid {
+                Laid::Flat => corners.iter().position(|corner| corner == gone || corner == kept).unwrap_or(0),
+                Laid::Covered => 0,
+            };
+            FaceLook::of([0, 1, 2].map(|side| corner(corners[(first + side) % 3])))
+        }));
         star.app.clear();
-        star.app.resize(overlay.new.len(), 0.0);
+        star.app.resize(star.changed.len(), 0.0);
         star.samples.clear();
         star.old.iter().for_each(|face| looks.on(*face, &mut star.samples));
         star.places.clear();
         star.vertex_places.clear();
-        let passes = |app: f32, face: usize| f64::from(total(overlay.geo[face] as f32, app)) <= limit.error;
+        let locate = |at: DVec3| match laid {
+            Laid::Flat => overlay.locate(at),
+            Laid::Covered => cover.locate(at),
+        };
+        let geo = |face: usize| match laid {
+            Laid::Flat => overlay.geo[face],
+            Laid::Covered => cover.new[face].1,
+        };
+        let passes = |app: f32, face: usize| f64::from(total(geo(face) as f32, app)) <= limit.error;
         for sample in &star.samples {
-            let (face, shares) = overlay.locate(looks.place(*sample));
+            let (face, shares) = locate(looks.place(*sample));
             let app = looks.error(*sample, &star.looks[face], shares);
             if !passes(app, face) {
                 return false;
@@ -458,31 +586,35 @@ impl Work {
             star.app[face] = star.app[face].max(app);
             star.places.push((*sample, face as u32));
         }
-        for gone in &overlay.gone {
-            let number = star.names[usize::from(*gone)];
-            let Some(base) = bases[number as usize] else { continue };
-            let was = &surface.vertices[number as usize];
-            let (face, shares) = overlay.locate(was.at);
+        for vanished in [Some(*gone), moved.map(|_| *kept)].into_iter().flatten() {
+            let Some(base) = bases[vanished as usize] else { continue };
+            let was = &surface.vertices[vanished as usize];
+            let (face, shares) = locate(was.at);
             let app = Looks::error_of_vertex(was, base, &star.looks[face], shares);
             if !passes(app, face) {
                 return false;
             }
             star.app[face] = star.app[face].max(app);
-            star.vertex_places.push((number, face as u32));
+            star.vertex_places.push((vanished, face as u32));
         }
         // Corners that stay keep what they had when this level began.
-        for (number, face) in overlay.new.iter().enumerate() {
-            for name in face.iter().filter(|name| **name != overlay.apex || operation.moved.is_none()) {
-                let base = bases[star.names[usize::from(*name)] as usize].unwrap_or(0.0);
-                star.app[number] = star.app[number].max(base);
+        for (app, face) in star.app.iter_mut().zip(&star.changed) {
+            for corner in surface.faces[*face as usize].corners {
+                if corner != *gone && (corner != *kept || moved.is_none()) {
+                    *app = app.max(bases[corner as usize].unwrap_or(0.0));
+                }
             }
         }
         true
     }
 
-    fn do_it(&mut self, operation: &Operation) {
+    fn do_it(&mut self, operation: &Operation, laid: Laid) {
         let Operation { gone, kept, moved } = *operation;
-        let Self { surface, overlay, star, looks, bases, quadrics, stamps, .. } = self;
+        let Self { surface, overlay, cover, star, looks, bases, quadrics, stamps, .. } = self;
+        self.clock += 1;
+        for face in &star.old {
+            surface.faces[*face as usize].corners.iter().for_each(|corner| self.changed[*corner as usize] = self.clock);
+        }
         if self.limit.keeps_looks {
             star.old.iter().for_each(|face| looks.clear(*face));
             for (sample, face) in &star.places {
@@ -500,7 +632,10 @@ impl Work {
         }
         for (number, face) in star.changed.iter().enumerate() {
             let changed = &mut surface.faces[*face as usize];
-            changed.geo = up(overlay.geo[number]);
+            changed.geo = up(match laid {
+                Laid::Flat => overlay.geo[number],
+                Laid::Covered => cover.new[number].1,
+            });
             if self.limit.keeps_looks {
                 changed.app = star.app[number];
             }
@@ -508,8 +643,6 @@ impl Work {
                 surface.reassign(*face, gone, kept);
             }
         }
-        self.clock += 1;
-        star.names.iter().for_each(|name| self.changed[*name as usize] = self.clock);
         quadrics[kept as usize] = quadrics[kept as usize].plus(&quadrics[gone as usize]);
         if let Some(moved) = moved {
             surface.vertices[kept as usize] = moved;
