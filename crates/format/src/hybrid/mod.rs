@@ -8,9 +8,11 @@
 //!
 //! Source: the hybrid paper, section 3.
 
+mod codec;
 mod contents;
 pub mod skeleton;
 
+pub use codec::{Model, PartBits, Prepared, Statistics};
 pub use contents::Page;
 pub use skeleton::{NodeId, NodeRecord, Root, Skeleton};
 

@@ -1,5 +1,6 @@
 //! The skeleton of a hybrid file: what holds for all of it, and a record for each node, coarse ones first.
 
+use super::codec::Model;
 use crate::FormatError;
 use crate::bytes::Fields;
 use gigalod_geom::Aabb;
@@ -93,6 +94,7 @@ pub struct Skeleton {
     nodes: Vec<NodeRecord>,
     /// Where each page begins in the file.
     offsets: Vec<u64>,
+    model: Model,
 }
 
 impl Skeleton {
@@ -107,7 +109,17 @@ impl Skeleton {
                 own
             })
             .collect();
-        Self { root, nodes, offsets }
+        Self { root, nodes, offsets, model: Model::default() }
+    }
+
+    /// The same with the model that coded the pages.
+    pub fn with_model(self, model: Model) -> Self {
+        Self { model, ..self }
+    }
+
+    /// What coded the pages.
+    pub fn model(&self) -> &Model {
+        &self.model
     }
 
     /// What holds for the whole hierarchy.

@@ -7,7 +7,7 @@
 //! one that is not legal has none, so a decoder never sees it.
 
 use super::lister::Symbol;
-use super::rans::{ROW, SYMBOLS, Slots, Table};
+use super::rans::{ROW, Slots, Table};
 use crate::FormatError;
 
 /// The first context of each field; each field's contexts are numbered from there.
