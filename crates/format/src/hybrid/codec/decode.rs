@@ -4,7 +4,7 @@
 //! What always holds: bytes whatever end in a page of exactly as many vertices, triangles, points and borders as asked for, or in `None`,
 //! after work and memory in proportion to these.
 
-use super::front::{self, Front};
+use super::front::{self, At, Front};
 use super::lanes::{BitReader, LANES, Reader};
 use super::model::Model;
 use super::predict::{self, Plane, parallelogram};
@@ -63,14 +63,14 @@ impl Streams {
         }
         let mut bits = BitReader::new(raw);
         let mut rare = vec![0; rare];
-        bits.numbers(&rare_classes, &mut rare, |number| number)?;
+        bits.numbers(&rare_classes, &mut rare, |out, number| *out = number)?;
         Some(Self { tokens, rare, keys, shift, classes, bits })
     }
 
     /// Numbers of a stream; the streams' in order.
     fn numbers<T: Clone + Default>(&mut self, stream: usize, of: impl Fn(u32) -> T) -> Option<Vec<T>> {
         let mut out = vec![T::default(); self.classes[stream].len()];
-        self.bits.numbers(&self.classes[stream], &mut out, of)?;
+        self.bits.numbers(&self.classes[stream], &mut out, |out, number| *out = of(number))?;
         Some(out)
     }
 }
@@ -91,121 +91,124 @@ fn varint(bytes: &mut &[u8]) -> Option<usize> {
 struct Weaving<'a> {
     front: Front,
     rare: std::slice::Iter<'a, u32>,
-    steps: [&'a [i16]; 3],
-    /// Vertices so far.
-    known: usize,
-    vertices: usize,
+    steps: &'a [[i16; 3]],
     positions: Vec<[u16; 3]>,
     triangles: Vec<[u32; 3]>,
-    most_triangles: usize,
     borders: Vec<[u32; 2]>,
     most_borders: usize,
-    /// The edge beside which each vertex was put, where colours need it.
-    beside: Option<Vec<[u32; 2]>>,
+}
+
+/// How far it has come: numbers of the next vertex and triangle.
+#[derive(Clone, Copy)]
+struct Next {
+    vertex: u32,
+    triangle: usize,
 }
 
 impl Weaving<'_> {
-    /// The next vertex.
+    /// Places the next vertex.
     #[inline(always)]
-    fn vertex(&mut self, guess: [i32; 3], plane: Plane, beside: [u32; 2]) -> Option<u32> {
-        let known = self.known;
-        let step = [*self.steps[0].get(known)?, *self.steps[1].get(known)?, *self.steps[2].get(known)?];
-        *self.positions.get_mut(known)? = plane.position(guess, step);
-        if let Some(edges) = &mut self.beside {
-            edges.push(beside);
-        }
-        self.known += 1;
-        Some(known as u32)
+    fn vertex(&mut self, next: &mut Next, guess: [i32; 3], plane: &Plane) -> Option<u32> {
+        let vertex = next.vertex;
+        let step = *self.steps.get(vertex as usize)?;
+        *self.positions.get_mut(vertex as usize)? = plane.position(guess, step);
+        next.vertex += 1;
+        Some(vertex)
     }
 
     /// One that begins a component, or has no triangle.
-    fn vertex_alone(&mut self) -> Option<u32> {
-        let before = self.known.checked_sub(1);
-        let guess = before.map_or([0; 3], |before| self.positions[before].map(i32::from));
-        self.vertex(guess, Plane::NONE, [before.unwrap_or(0) as u32; 2])
+    fn vertex_alone(&mut self, next: &mut Next) -> Option<u32> {
+        let before = next.vertex.checked_sub(1);
+        let guess = before.map_or([0; 3], |before| self.positions[before as usize].map(i32::from));
+        self.vertex(next, guess, &Plane::NONE)
     }
 
-    fn start(&mut self) -> Option<()> {
+    #[inline(always)]
+    fn triangle(&mut self, next: &mut Next, triangle: [u32; 3]) -> Option<()> {
+        *self.triangles.get_mut(next.triangle)? = triangle;
+        next.triangle += 1;
+        Some(())
+    }
+
+    #[inline(never)]
+    fn start(&mut self, next: &mut Next) -> Option<At> {
         let mut corners = [0; 3];
         for corner in &mut corners {
             *corner = match *self.rare.next()? {
-                0 => self.vertex_alone()?,
-                back => (self.known as u32).checked_sub(back)?,
+                0 => self.vertex_alone(next)?,
+                back => next.vertex.checked_sub(back)?,
             };
         }
-        self.triangle(corners)?;
-        self.front.start(corners);
-        Some(())
+        self.triangle(next, corners)?;
+        Some(self.front.start(corners))
     }
 
-    #[inline(always)]
-    fn triangle(&mut self, triangle: [u32; 3]) -> Option<()> {
-        if self.triangles.len() >= self.most_triangles {
-            return None;
-        }
-        self.triangles.push(triangle);
-        Some(())
-    }
-
-    #[inline(always)]
-    fn token(&mut self, token: u8) -> Option<()> {
-        let (added, end) = (token / weave::ENDS, token % weave::ENDS);
-        if added > 0 {
-            let at = |vertex: u32| self.positions[vertex as usize];
-            let plane = Plane::of(at(self.front.from), at(self.front.to), at(self.front.opposite));
-            for _ in 0..added {
-                let [a, b, c] = [self.front.from, self.front.to, self.front.opposite];
-                let guess =
-                    parallelogram(self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]);
-                let vertex = self.vertex(guess, plane, [a, b])?;
-                let triangle = self.front.add(vertex);
-                self.triangle(triangle)?;
+    /// All triangles. What changes with each is kept in variables of its own.
+    #[inline(never)]
+    fn weave(&mut self, mut at: At, tokens: &[u8]) -> Option<Next> {
+        let mut next = Next { vertex: 0, triangle: 0 };
+        for token in tokens {
+            if at.is_closed {
+                let mut after = next;
+                at = self.start(&mut after)?;
+                next = after;
             }
-            if u32::from(added) == weave::MOST_ADDED {
-                return Some(());
-            }
-        }
-        match end {
-            weave::CLOSE => {
-                let triangle = self.front.close()?;
-                self.triangle(triangle)
-            }
-            weave::BORDER => {
-                if self.borders.len() >= self.most_borders {
-                    return None;
+            let (added, end) = (token / weave::ENDS, token % weave::ENDS);
+            if added > 0 {
+                let [a, mut b, mut c] =
+                    [at.from, at.to, at.opposite].map(|vertex| self.positions[vertex as usize]);
+                let plane = Plane::of(a, b, c);
+                for _ in 0..added {
+                    let vertex = self.vertex(&mut next, parallelogram(a, b, c), &plane)?;
+                    (c, b) = (b, self.positions[vertex as usize]);
+                    let triangle = self.front.add(&mut at, vertex);
+                    self.triangle(&mut next, triangle)?;
                 }
-                self.borders.push([self.front.from, self.front.to]);
-                self.front.end();
-                Some(())
+                if u32::from(added) >= weave::MOST_ADDED {
+                    continue;
+                }
             }
-            weave::SKIP => {
-                let triangle = self.front.skip()?;
-                self.triangle(triangle)
-            }
-            weave::BACK => {
-                let triangle = self.front.join_back(front::BACK)?;
-                self.triangle(triangle)
-            }
-            _ => self.rare(),
+            let triangle = match end {
+                weave::CLOSE => self.front.close(&mut at)?,
+                weave::BORDER => {
+                    if self.borders.len() >= self.most_borders {
+                        return None;
+                    }
+                    self.borders.push([at.from, at.to]);
+                    self.front.end(&mut at);
+                    continue;
+                }
+                weave::SKIP => self.front.skip(&mut at)?,
+                weave::BACK => self.front.join_back(&mut at, front::BACK)?,
+                _ => {
+                    let triangle;
+                    (at, triangle) = self.rare(at, next.vertex)?;
+                    match triangle {
+                        Some(triangle) => triangle,
+                        None => continue,
+                    }
+                }
+            };
+            self.triangle(&mut next, triangle)?;
         }
+        at.is_closed.then_some(next)
     }
 
-    fn rare(&mut self) -> Option<()> {
-        match *self.rare.next()? {
+    #[inline(never)]
+    fn rare(&mut self, mut at: At, known: u32) -> Option<(At, Option<[u32; 3]>)> {
+        let triangle = match *self.rare.next()? {
             weave::SEAM => {
-                self.front.end();
-                Some(())
+                self.front.end(&mut at);
+                None
             }
-            back @ 1..weave::TO_KNOWN => {
-                let triangle = self.front.join_back(front::BACK + back)?;
-                self.triangle(triangle)
-            }
+            back @ 1..weave::TO_KNOWN => Some(self.front.join_back(&mut at, front::BACK + back)?),
             ago => {
-                let vertex = (self.known as u32).checked_sub(ago - weave::TO_KNOWN + 1)?;
-                let triangle = self.front.join(vertex);
-                self.triangle(triangle)
+                let triangle;
+                (at, triangle) = self.front.join(at, known.checked_sub(ago - weave::TO_KNOWN + 1)?);
+                Some(triangle)
             }
-        }
+        };
+        Some((at, triangle))
     }
 }
 
@@ -213,38 +216,34 @@ impl Weaving<'_> {
 pub(in super::super) fn decode(bytes: &[u8], model: &Model, record: &NodeRecord, root: &Root) -> Option<Page> {
     let (vertices, points, triangles) = (record.vertices as usize, record.points as usize, record.triangles as usize);
     let mut streams = Streams::read(bytes, model, record, root)?;
-    let step = |number: u32| unfolded(number) as i16;
-    let steps = [streams.numbers(0, step)?, streams.numbers(1, step)?, streams.numbers(2, step)?];
+    let mut steps = vec![[0; 3]; vertices];
+    for coordinate in 0..3 {
+        streams.bits.numbers(&streams.classes[coordinate], &mut steps, |step: &mut [i16; 3], number| {
+            step[coordinate] = unfolded(number) as i16;
+        })?;
+    }
+    let (front, at) = Front::new(vertices + vertices / 4 + 64, vertices);
     let mut weaving = Weaving {
-        front: Front::new(vertices + vertices / 4 + 64, vertices),
+        front,
         rare: streams.rare.iter(),
-        steps: steps.each_ref().map(|steps| &steps[..]),
-        known: 0,
-        vertices,
+        steps: &steps,
         positions: vec![[0; 3]; vertices + points],
-        triangles: Vec::with_capacity(triangles),
-        most_triangles: triangles,
+        triangles: vec![[0; 3]; triangles],
         borders: Vec::with_capacity(record.borders as usize),
         most_borders: record.borders as usize,
-        beside: root.has_colors.then(|| Vec::with_capacity(vertices)),
     };
-    for token in &streams.tokens {
-        if weaving.front.is_closed {
-            weaving.start()?;
-        }
-        weaving.token(*token)?;
+    let mut next = weaving.weave(at, &streams.tokens)?;
+    while (next.vertex as usize) < vertices {
+        weaving.vertex_alone(&mut next)?;
     }
-    while weaving.known < weaving.vertices {
-        weaving.vertex_alone()?;
-    }
-    let Weaving { front, rare, positions, triangles: woven, borders, beside, .. } = weaving;
-    if !front.is_closed || rare.len() > 0 || woven.len() != triangles || borders.len() != record.borders as usize {
+    let Weaving { rare, positions, triangles: woven, borders, .. } = weaving;
+    if rare.len() > 0 || next.triangle != triangles || borders.len() != record.borders as usize {
         return None;
     }
     let mut page = Page { positions, triangles: woven, borders, ..Page::default() };
     vertex_normals(&mut page, &mut streams, vertices, root.normal_bits)?;
-    if let Some(beside) = beside {
-        vertex_colors(&mut page, &mut streams, &beside)?;
+    if root.has_colors {
+        vertex_colors(&mut page, &mut streams, vertices)?;
     }
     all_points(&mut page, &mut streams, vertices, root)?;
     streams.bits.is_within().then_some(page)
@@ -253,21 +252,26 @@ pub(in super::super) fn decode(bytes: &[u8], model: &Model, record: &NodeRecord,
 fn vertex_normals(page: &mut Page, streams: &mut Streams, vertices: usize, bits: u32) -> Option<()> {
     let most = ((1 << bits) - 1) as f32;
     let mask = (1 << bits) - 1;
+    let mut differences = vec![[0; 2]; vertices];
+    for coordinate in 0..2 {
+        let set = |difference: &mut [u16; 2], number: u32| difference[coordinate] = number as u16;
+        streams.bits.numbers(&streams.classes[3 + coordinate], &mut differences, set)?;
+    }
     let sums = predict::normals(&page.positions, &page.triangles, vertices);
-    let [u, v] = [streams.numbers(3, |number| number as u16)?, streams.numbers(4, |number| number as u16)?];
     page.normals.reserve_exact(page.positions.len());
-    page.normals.extend(sums.iter().zip(u).zip(v).map(|((sum, u), v)| {
-        let [guess_u, guess_v] = predict::octahedral([sum[0], sum[1], sum[2]], most);
+    page.normals.extend(sums.iter().zip(differences).map(|(sum, [u, v])| {
+        let [guess_u, guess_v] = predict::octahedral(*sum, most);
         predict::wrapped(guess_u, u32::from(u), mask) | predict::wrapped(guess_v, u32::from(v), mask) << 16
     }));
     Some(())
 }
 
-fn vertex_colors(page: &mut Page, streams: &mut Streams, beside: &[[u32; 2]]) -> Option<()> {
+fn vertex_colors(page: &mut Page, streams: &mut Streams, vertices: usize) -> Option<()> {
     let byte = |number: u32| unfolded(number) as u8;
     let [green, red, blue] = [streams.numbers(5, byte)?, streams.numbers(6, byte)?, streams.numbers(7, byte)?];
     page.colors.reserve_exact(page.positions.len());
-    for (((edge, green), red), blue) in beside.iter().zip(green).zip(red).zip(blue) {
+    let edges = predict::edges(&page.triangles, vertices);
+    for (((edge, green), red), blue) in edges.into_iter().zip(green).zip(red).zip(blue) {
         let [a, b] = edge.map(|vertex| page.colors.get(vertex as usize).copied().unwrap_or_default());
         page.colors.push(predict::color_from(predict::between(a, b), [green, red, blue]));
     }

@@ -1,19 +1,23 @@
 //! The front: closed chains of edges between the triangles that are known and those that are not, and what can happen to it.
 //!
-//! Coder and decoder move the same front by the same steps, so they agree about what an edge leads to. The front is a ring of
-//! *slots*; each has a vertex and stands for the edge to the next slot, with known triangles on its left. Slots that have no vertex are
-//! *holes*: edges that nothing more is joined to. At any time one slot, the *focus*, has an edge that is live.
+//! Coder and decoder move the same front by the same steps, so they agree about what an edge leads to. The front is rings of *slots*;
+//! each has a vertex and stands for the edge to the next slot, with a known triangle on its left. Slots that have no vertex are
+//! *holes*: edges that nothing more is joined to. At any time one slot, the *focus*, has an edge that is live: [`At`].
 //!
 //! What always holds: whatever steps are taken, links lead to slots; no two holes are neighbours; a slot with a vertex has a live edge
 //! before or after it. Steps that cannot be taken say so and change nothing.
 //!
-//! Source: Gumhold & Straßer, *Real time compression of triangle mesh connectivity*, SIGGRAPH 1998. Differs: vertices are addressed by
-//! their numbers, so that any triangles whatever can be coded; rings are not split but closed by *zips*.
+//! Source: Gumhold & Straßer, *Real time compression of triangle mesh connectivity*, SIGGRAPH 1998. Differs: the focus stays at a vertex
+//! until it is done; vertices are addressed by their numbers, so that any triangles whatever can be coded.
 
 /// Vertex of a hole.
 const HOLE: u32 = u32::MAX;
 
-#[derive(Clone, Copy, Debug)]
+/// How many slots before the focus [`Front::join_back`] reaches: the slot before it is [`Front::close`]'s.
+pub(super) const BACK: u32 = 2;
+pub(super) const MOST_BACK: u32 = 7;
+
+#[derive(Clone, Copy, Debug, Default)]
 struct Slot {
     vertex: u32,
     next: u32,
@@ -22,15 +26,9 @@ struct Slot {
     opposite: u32,
 }
 
-/// How many slots before the focus [`Front::join_back`] reaches: the slot before it is [`Front::close`]'s.
-pub(super) const BACK: u32 = 2;
-pub(super) const MOST_BACK: u32 = 7;
-
-/// A ring, seen from its focus.
-#[derive(Debug, Default)]
-pub(super) struct Front {
-    slots: Vec<Slot>,
-    /// Its edge is the one that is looked at.
+/// The edge that is looked at. Kept apart, so that a decoder has it in registers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct At {
     focus: u32,
     /// The slot after it.
     after: u32,
@@ -40,6 +38,14 @@ pub(super) struct Front {
     pub(super) opposite: u32,
     /// True when no ring has a live edge.
     pub(super) is_closed: bool,
+}
+
+/// All rings.
+#[derive(Debug)]
+pub(super) struct Front {
+    slots: Vec<Slot>,
+    /// Slots that were given out.
+    used: u32,
     /// The slot that a vertex got last.
     slot_of: Vec<u32>,
     /// A slot of each ring that waits.
@@ -47,9 +53,15 @@ pub(super) struct Front {
 }
 
 impl Front {
-    /// Closed, with room for some slots.
-    pub(super) fn new(slots: usize, vertices: usize) -> Self {
-        Self { slots: Vec::with_capacity(slots), slot_of: vec![0; vertices], is_closed: true, ..Self::default() }
+    /// None yet, with room for some slots.
+    pub(super) fn new(slots: usize, vertices: usize) -> (Self, At) {
+        let front = Self {
+            slots: vec![Slot::default(); slots.max(16)],
+            used: 0,
+            slot_of: vec![0; vertices],
+            waiting: Vec::new(),
+        };
+        (front, At { is_closed: true, ..At::default() })
     }
 
     #[inline(always)]
@@ -57,136 +69,154 @@ impl Front {
         &mut self.slots[at as usize]
     }
 
+    #[inline(always)]
+    fn give(&mut self, slot: Slot) -> u32 {
+        let at = self.used;
+        if at as usize >= self.slots.len() {
+            self.grow();
+        }
+        *self.slot(at) = slot;
+        self.used += 1;
+        at
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self) {
+        self.slots.resize(2 * self.slots.len(), Slot::default());
+    }
+
     /// A new ring around one triangle.
-    pub(super) fn start(&mut self, [a, b, c]: [u32; 3]) {
-        let first = self.slots.len() as u32;
-        self.slots.extend([
-            Slot { vertex: a, next: first + 1, previous: first + 2, opposite: c },
-            Slot { vertex: b, next: first + 2, previous: first, opposite: a },
-            Slot { vertex: c, next: first, previous: first + 1, opposite: b },
-        ]);
+    #[inline(never)]
+    pub(super) fn start(&mut self, [a, b, c]: [u32; 3]) -> At {
+        let first = self.used;
         for (slot, vertex) in (first..).zip([a, b, c]) {
             self.slot_of[vertex as usize] = slot;
         }
-        (self.focus, self.after) = (first, first + 1);
-        (self.from, self.to, self.opposite) = (a, b, c);
-        self.is_closed = false;
+        self.give(Slot { vertex: a, next: first + 1, previous: first + 2, opposite: c });
+        self.give(Slot { vertex: b, next: first + 2, previous: first, opposite: a });
+        self.give(Slot { vertex: c, next: first, previous: first + 1, opposite: b });
+        At { focus: first, after: first + 1, from: a, to: b, opposite: c, is_closed: false }
     }
 
     /// Joins a triangle with a vertex that is put between the two.
     #[inline(always)]
-    pub(super) fn add(&mut self, vertex: u32) -> [u32; 3] {
-        let (slot, focus, after) = (self.slots.len() as u32, self.focus, self.after);
-        self.slots.push(Slot { vertex, next: after, previous: focus, opposite: self.from });
-        self.slot(after).previous = slot;
-        self.slot(focus).next = slot;
+    pub(super) fn add(&mut self, at: &mut At, vertex: u32) -> [u32; 3] {
+        let slot = self.give(Slot { vertex, next: at.after, previous: at.focus, opposite: at.from });
+        self.slot(at.after).previous = slot;
+        self.slot(at.focus).next = slot;
         self.slot_of[vertex as usize] = slot;
-        let triangle = [self.to, self.from, vertex];
-        (self.after, self.opposite, self.to) = (slot, self.to, vertex);
+        let triangle = [at.to, at.from, vertex];
+        (at.after, at.opposite, at.to) = (slot, at.to, vertex);
         triangle
     }
 
     /// The slot and vertex that [`Self::close`] would join the edge with.
     #[inline(always)]
-    fn closing(&self) -> Option<(u32, u32)> {
-        let before = self.slots[self.focus as usize].previous;
+    fn closing(&self, at: &At) -> Option<(u32, u32)> {
+        let before = self.slots[at.focus as usize].previous;
         let vertex = self.slots[before as usize].vertex;
-        (vertex != HOLE && before != self.after).then_some((before, vertex))
+        (vertex != HOLE && before != at.after).then_some((before, vertex))
     }
 
     /// The same for [`Self::skip`].
     #[inline(always)]
-    fn skipping(&self) -> Option<(u32, u32)> {
-        let third = self.slots[self.after as usize].next;
+    fn skipping(&self, at: &At) -> Option<(u32, u32)> {
+        let third = self.slots[at.after as usize].next;
         let vertex = self.slots[third as usize].vertex;
-        (vertex != HOLE && third != self.focus && self.after != self.focus).then_some((third, vertex))
+        (vertex != HOLE && third != at.focus && at.after != at.focus).then_some((third, vertex))
     }
 
     /// True when [`Self::close`] would join the edge with this vertex.
-    pub(super) fn can_close(&self, vertex: u32) -> bool {
-        self.closing().is_some_and(|(_, found)| found == vertex)
+    pub(super) fn can_close(&self, at: &At, vertex: u32) -> bool {
+        self.closing(at).is_some_and(|(_, found)| found == vertex)
     }
 
     /// The same for [`Self::skip`].
-    pub(super) fn can_skip(&self, vertex: u32) -> bool {
-        self.skipping().is_some_and(|(_, found)| found == vertex)
+    pub(super) fn can_skip(&self, at: &At, vertex: u32) -> bool {
+        self.skipping(at).is_some_and(|(_, found)| found == vertex)
     }
 
-    /// Joins a triangle with the slot before the focus, which leaves the ring.
+    /// Joins a triangle with the slot before the focus, which leaves the ring. A ring of three is done by that.
     #[inline(always)]
-    pub(super) fn close(&mut self) -> Option<[u32; 3]> {
-        let (before, vertex) = self.closing()?;
-        let after = self.after;
-        let triangle = [self.to, self.from, vertex];
+    pub(super) fn close(&mut self, at: &mut At) -> Option<[u32; 3]> {
+        let (before, vertex) = self.closing(at)?;
+        let after = at.after;
+        let triangle = [at.to, at.from, vertex];
         self.slot(before).next = after;
         self.slot(after).previous = before;
-        (self.focus, self.opposite, self.from) = (before, self.from, vertex);
+        (at.focus, at.opposite, at.from) = (before, at.from, vertex);
         if self.slot(after).next == before {
-            self.retire(before, after);
+            *at = self.retire(before, after);
         }
         Some(triangle)
     }
 
     /// Joins a triangle with the slot after the next, which leaves the ring.
     #[inline(always)]
-    pub(super) fn skip(&mut self) -> Option<[u32; 3]> {
-        let (third, vertex) = self.skipping()?;
-        let focus = self.focus;
-        let triangle = [self.to, self.from, vertex];
-        self.slot(focus).next = third;
-        self.slot(third).previous = focus;
-        (self.after, self.opposite, self.to) = (third, self.to, vertex);
+    pub(super) fn skip(&mut self, at: &mut At) -> Option<[u32; 3]> {
+        let (third, vertex) = self.skipping(at)?;
+        let triangle = [at.to, at.from, vertex];
+        self.slot(at.focus).next = third;
+        self.slot(third).previous = at.focus;
+        (at.after, at.opposite, at.to) = (third, at.to, vertex);
         Some(triangle)
     }
 
     /// Nothing more is joined to the edge.
     #[inline(always)]
-    pub(super) fn end(&mut self) {
-        let (focus, after) = (self.focus, self.after);
+    pub(super) fn end(&mut self, at: &mut At) {
+        let (focus, after) = (at.focus, at.after);
         let third = self.slot(after).next;
         let hole = if self.slot(third).vertex == HOLE {
             third
         } else {
-            let hole = self.slots.len() as u32;
-            self.slots.push(Slot { vertex: HOLE, next: after, previous: focus, opposite: HOLE });
+            let hole = self.give(Slot { vertex: HOLE, next: after, previous: focus, opposite: HOLE });
             self.slot(after).previous = hole;
             hole
         };
         self.slot(focus).next = hole;
         self.slot(hole).previous = focus;
-        self.settle(focus);
+        *at = self.settle(focus);
     }
 
     /// Joins a triangle with a vertex that is known. Where that still has a slot, the ring becomes two there, or two become one.
-    pub(super) fn join(&mut self, vertex: u32) -> [u32; 3] {
+    #[inline(never)]
+    pub(super) fn join(&mut self, mut at: At, vertex: u32) -> (At, [u32; 3]) {
         let slot = self.slot_of[vertex as usize];
         let is_there = self.is_live(slot) && self.slot(slot).vertex == vertex;
-        if is_there && slot != self.focus && slot != self.after { self.join_slot(slot, vertex) } else { self.add(vertex) }
+        let triangle = if is_there && slot != at.focus && slot != at.after {
+            self.join_slot(&mut at, slot, vertex)
+        } else {
+            self.add(&mut at, vertex)
+        };
+        (at, triangle)
     }
 
     /// How many slots before the focus there is one with this vertex, if [`Self::join_back`] reaches it.
-    pub(super) fn back_to(&self, vertex: u32) -> Option<u32> {
-        (BACK..=MOST_BACK).find(|back| self.back(*back).is_some_and(|slot| self.slots[slot as usize].vertex == vertex))
+    pub(super) fn back_to(&self, at: &At, vertex: u32) -> Option<u32> {
+        (BACK..=MOST_BACK)
+            .find(|back| self.back(at, *back).is_some_and(|slot| self.slots[slot as usize].vertex == vertex))
     }
 
     /// Joins a triangle with the slot so many before the focus. What lies between becomes a ring of its own, and the one in focus.
     #[inline(always)]
-    pub(super) fn join_back(&mut self, back: u32) -> Option<[u32; 3]> {
-        let slot = self.back(back)?;
+    pub(super) fn join_back(&mut self, at: &mut At, back: u32) -> Option<[u32; 3]> {
+        let slot = self.back(at, back)?;
         let vertex = self.slot(slot).vertex;
-        (vertex != HOLE).then(|| self.join_slot(slot, vertex))
+        (vertex != HOLE).then(|| self.join_slot(at, slot, vertex))
     }
 
     #[inline(always)]
-    fn back(&self, back: u32) -> Option<u32> {
-        let mut slot = self.focus;
+    fn back(&self, at: &At, back: u32) -> Option<u32> {
+        let mut slot = at.focus;
         for _ in 0..back {
             slot = self.slots[slot as usize].previous;
-            if slot == self.after {
+            if slot == at.after || slot == at.focus {
                 return None;
             }
         }
-        (slot != self.focus).then_some(slot)
+        Some(slot)
     }
 
     /// Whether a slot is part of a ring: those that left are no longer their neighbours' neighbour.
@@ -196,28 +226,27 @@ impl Front {
     }
 
     #[inline(always)]
-    fn join_slot(&mut self, slot: u32, vertex: u32) -> [u32; 3] {
-        let (focus, after, previous) = (self.focus, self.after, self.slots[slot as usize].previous);
-        let twin = self.slots.len() as u32;
-        self.slots.push(Slot { vertex, next: after, previous, opposite: self.from });
+    fn join_slot(&mut self, at: &mut At, slot: u32, vertex: u32) -> [u32; 3] {
+        let (focus, after, previous) = (at.focus, at.after, self.slots[slot as usize].previous);
+        let twin = self.give(Slot { vertex, next: after, previous, opposite: at.from });
         self.slot(previous).next = twin;
         self.slot(after).previous = twin;
         self.slot(focus).next = slot;
         self.slot(slot).previous = focus;
         self.waiting.push(twin);
-        let triangle = [self.to, self.from, vertex];
-        (self.after, self.opposite, self.to) = (slot, self.to, vertex);
+        let triangle = [at.to, at.from, vertex];
+        (at.after, at.opposite, at.to) = (slot, at.to, vertex);
         triangle
     }
 
-    /// The ring has only these two slots, with nothing between them any more.
-    fn retire(&mut self, a: u32, b: u32) {
+    /// The ring has only these two slots, with nothing between them any more: another one's turn.
+    #[inline(never)]
+    fn retire(&mut self, a: u32, b: u32) -> At {
         self.slot(a).vertex = HOLE;
         self.slot(b).vertex = HOLE;
         loop {
             let Some(slot) = self.waiting.pop() else {
-                self.is_closed = true;
-                return;
+                return At { is_closed: true, ..At::default() };
             };
             if self.is_live(slot) {
                 return self.settle(slot);
@@ -225,16 +254,14 @@ impl Front {
         }
     }
 
-    /// Moves the focus to the nearest live edge, backwards.
-    #[inline(always)]
-    fn settle(&mut self, mut focus: u32) {
+    /// The nearest live edge, backwards.
+    #[inline(never)]
+    fn settle(&mut self, mut focus: u32) -> At {
         loop {
             let Slot { vertex, next, previous, opposite } = *self.slot(focus);
             let to = self.slot(next).vertex;
             if to != HOLE {
-                (self.focus, self.after) = (focus, next);
-                (self.from, self.to, self.opposite) = (vertex, to, opposite);
-                return;
+                return At { focus, after: next, from: vertex, to, opposite, is_closed: false };
             }
             if self.slot(previous).vertex != HOLE {
                 focus = previous;

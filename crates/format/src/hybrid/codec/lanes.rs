@@ -170,16 +170,16 @@ impl BitReader {
         Self { bytes: padded, at: 0 }
     }
 
-    /// The numbers that classes and the next bits are, as `of` makes them; `None` where bits end.
+    /// The numbers that classes and the next bits are, each given to `set`; `None` where bits end.
     #[inline(always)]
-    pub(super) fn numbers<T>(&mut self, classes: &[u8], out: &mut [T], of: impl Fn(u32) -> T) -> Option<()> {
+    pub(super) fn numbers<T>(&mut self, classes: &[u8], out: &mut [T], set: impl Fn(&mut T, u32)) -> Option<()> {
         let mut at = self.at;
         for (class, out) in classes.iter().zip(out) {
             let class = usize::from(*class) & (SYMBOLS - 1);
             let chunk: &[u8; 8] = self.bytes.get(at >> 3..)?.first_chunk()?;
             let bits = u64::from_le_bytes(*chunk) >> (at & 7);
             let extra = EXTRA_BITS[class];
-            *out = of(BASES[class] + (bits as u32 & ((1u32 << extra) - 1)));
+            set(out, BASES[class] + (bits as u32 & ((1u32 << extra) - 1)));
             at += usize::from(extra);
         }
         self.at = at;

@@ -3,6 +3,7 @@
 //! All sums are of `f32` in a stated order, or of integers, so they are the same everywhere.
 
 use super::values::{folded, unfolded};
+use glam::{Vec4, Vec4Swizzles};
 
 /// The plane of a known triangle: with it the third coordinate of a step along it follows from two.
 #[derive(Clone, Copy, Debug)]
@@ -81,18 +82,19 @@ pub(super) fn parallelogram(a: [u16; 3], b: [u16; 3], c: [u16; 3]) -> [i32; 3] {
     [0, 1, 2].map(|axis| i32::from(a[axis]) + i32::from(b[axis]) - i32::from(c[axis]))
 }
 
-/// Normals of the vertices, from their triangles in order, each as long as the sum of the areas.
-pub(super) fn normals(positions: &[[u16; 3]], triangles: &[[u32; 3]], vertices: usize) -> Vec<[f32; 4]> {
-    let mut sums = vec![[0.0; 4]; vertices];
-    let mut add = |vertex: u32, [x, y, z]: [f32; 3]| {
-        let sum: &mut [f32; 4] = &mut sums[vertex as usize];
-        *sum = [sum[0] + x, sum[1] + y, sum[2] + z, sum[3]];
-    };
+/// Normals of the vertices: the sum of the crosses of their triangles, in order.
+pub(super) fn normals(positions: &[[u16; 3]], triangles: &[[u32; 3]], vertices: usize) -> Vec<Vec4> {
+    let corners: Vec<Vec4> = positions[..vertices]
+        .iter()
+        .map(|[x, y, z]| Vec4::new(f32::from(*x), f32::from(*y), f32::from(*z), 0.0))
+        .collect();
+    let mut sums = vec![Vec4::ZERO; vertices];
     for triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
-        let normal = cross(edge(a, b), edge(a, c));
+        let [a, b, c] = triangle.map(|vertex| corners[vertex as usize]);
+        let (b, c) = (b - a, c - a);
+        let normal = b.yzxw() * c.zxyw() - b.zxyw() * c.yzxw();
         for vertex in triangle {
-            add(*vertex, normal);
+            sums[*vertex as usize] += normal;
         }
     }
     sums
@@ -100,13 +102,32 @@ pub(super) fn normals(positions: &[[u16; 3]], triangles: &[[u32; 3]], vertices: 
 
 /// Code of a direction on the octahedron, `most` = 2^bits − 1.
 #[inline(always)]
-pub(super) fn octahedral([x, y, z]: [f32; 3], most: f32) -> [i32; 2] {
+pub(super) fn octahedral(direction: Vec4, most: f32) -> [i32; 2] {
+    let [x, y, z, _] = direction.to_array();
     let sum = x.abs() + y.abs() + z.abs();
-    let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+    let scale = 1.0 / if sum > 0.0 { sum } else { 1.0 };
     let (x, y) = (x * scale, y * scale);
     let (folded_x, folded_y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
     let (x, y) = if z < 0.0 { (folded_x, folded_y) } else { (x, y) };
-    [x, y].map(|coordinate| ((coordinate * 0.5 + 0.5) * most + 0.5) as i32)
+    [x, y].map(|coordinate| rounded((coordinate * 0.5 + 0.5) * most))
+}
+
+/// The edge between whose ends the colour of each vertex is expected: where it is the third corner of the first triangle that has it,
+/// the other two; else twice the vertex before.
+pub(super) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<[u32; 2]> {
+    let mut edges = Vec::with_capacity(vertices);
+    for [a, b, c] in triangles {
+        for corner in [a, b] {
+            if *corner as usize == edges.len() {
+                edges.push([corner.saturating_sub(1); 2]);
+            }
+        }
+        if *c as usize == edges.len() {
+            edges.push([*a, *b]);
+        }
+    }
+    edges.extend((edges.len()..vertices).map(|vertex| [vertex.saturating_sub(1) as u32; 2]));
+    edges
 }
 
 /// A code from its guess and how far it is from that, round the corner.

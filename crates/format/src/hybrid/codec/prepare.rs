@@ -51,7 +51,7 @@ impl Prepared {
         let mut differences: [Vec<u32>; STREAMS.len()] = Default::default();
         positions(&page, &woven, &mut differences);
         vertex_normals(&page, vertices, normal_bits, &mut differences);
-        colors(&page, &woven, &mut differences);
+        colors(&page, vertices, &mut differences);
         let mut prepared =
             Self { page, vertices, tokens: woven.tokens, rare: woven.rare, key_classes: Vec::new(), keys: Vec::new(), shift, differences };
         prepared.points(normal_bits);
@@ -169,9 +169,9 @@ fn positions(page: &Page, woven: &Woven, differences: &mut [Vec<u32>; STREAMS.le
 fn vertex_normals(page: &Page, vertices: usize, normal_bits: u32, differences: &mut [Vec<u32>; STREAMS.len()]) {
     let most = ((1 << normal_bits) - 1) as f32;
     let guesses = normals(&page.positions, &page.triangles, vertices);
-    for ([x, y, z, _], normal) in guesses.into_iter().zip(&page.normals) {
+    for (direction, normal) in guesses.into_iter().zip(&page.normals) {
         let code = [(normal & 0xFFFF) as i32, (normal >> 16) as i32];
-        let guess = octahedral([x, y, z], most);
+        let guess = octahedral(direction, most);
         for coordinate in 0..2 {
             assert!(code[coordinate] >> normal_bits == 0, "a normal's code {normal:#010x}, expected {normal_bits} bits");
             differences[3 + coordinate].push(predict::difference(code[coordinate], guess[coordinate], normal_bits));
@@ -179,13 +179,13 @@ fn vertex_normals(page: &Page, vertices: usize, normal_bits: u32, differences: &
     }
 }
 
-fn colors(page: &Page, woven: &Woven, differences: &mut [Vec<u32>; STREAMS.len()]) {
+fn colors(page: &Page, vertices: usize, differences: &mut [Vec<u32>; STREAMS.len()]) {
     if page.colors.is_empty() {
         return;
     }
-    for (vertex, made) in woven.made.iter().enumerate() {
+    for (vertex, [a, b]) in predict::edges(&page.triangles, vertices).into_iter().enumerate() {
         let at = |corner: u32| if vertex == 0 { [0; 4] } else { page.colors[corner as usize] };
-        let guess = predict::between(at(made.beside[0]), at(made.beside[1]));
+        let guess = predict::between(at(a), at(b));
         for (channel, difference) in predict::color_differences(page.colors[vertex], guess).into_iter().enumerate() {
             differences[5 + channel].push(difference);
         }

@@ -2,7 +2,7 @@
 //!
 //! In: triangles. Out: the same triangles in the order and with the numbering that a decoder gives them, and what it must be told.
 
-use super::front::{self, Front};
+use super::front::{self, At, Front};
 
 /// Most new vertices that one token adds.
 pub(super) const MOST_ADDED: u32 = 6;
@@ -148,7 +148,7 @@ impl Weaver<'_> {
         self.out.rare.push(value);
     }
 
-    fn start(&mut self, triangle: usize, front: &mut Front) {
+    fn start(&mut self, triangle: usize, front: &mut Front) -> At {
         self.woven[triangle] = true;
         let corners = self.triangles[triangle].map(|old| {
             let known = self.out.order.len();
@@ -157,26 +157,26 @@ impl Weaver<'_> {
             number
         });
         self.out.triangles.push(corners);
-        front.start(corners);
+        front.start(corners)
     }
 
-    fn step(&mut self, front: &mut Front) {
-        let [from, to] = [front.from, front.to].map(|new| self.out.order[new as usize]);
+    fn step(&mut self, front: &mut Front, at: &mut At) {
+        let [from, to] = [at.from, at.to].map(|new| self.out.order[new as usize]);
         let Some(side) = self.sides.free(to, from, &self.woven) else {
             if self.sides.is_border(from, to) {
-                self.out.borders.push([front.from, front.to]);
+                self.out.borders.push([at.from, at.to]);
                 self.end_token(BORDER);
-                front.end();
+                front.end(at);
             } else {
                 self.rare(SEAM);
-                front.end();
+                front.end(at);
             }
             return;
         };
         self.woven[side as usize / 3] = true;
         let old = self.triangles[side as usize / 3][(side as usize % 3 + 2) % 3];
         let known = self.out.order.len() as u32;
-        let beside = [front.from, front.to, front.opposite];
+        let beside = [at.from, at.to, at.opposite];
         if self.added == 0 {
             self.plane = beside;
         }
@@ -186,22 +186,24 @@ impl Weaver<'_> {
             if self.added == MOST_ADDED {
                 self.end_token(0);
             }
-            front.add(number)
-        } else if front.can_close(number) {
+            front.add(at, number)
+        } else if front.can_close(at, number) {
             self.end_token(CLOSE);
-            front.close().expect("it was asked")
-        } else if front.can_skip(number) {
+            front.close(at).expect("it was asked")
+        } else if front.can_skip(at, number) {
             self.end_token(SKIP);
-            front.skip().expect("it was asked")
-        } else if let Some(back) = front.back_to(number) {
+            front.skip(at).expect("it was asked")
+        } else if let Some(back) = front.back_to(at, number) {
             match back {
                 front::BACK => self.end_token(BACK),
                 _ => self.rare(back - front::BACK),
             }
-            front.join_back(back).expect("it was asked")
+            front.join_back(at, back).expect("it was asked")
         } else {
             self.rare(TO_KNOWN + known - 1 - number);
-            front.join(number)
+            let triangle;
+            (*at, triangle) = front.join(*at, number);
+            triangle
         };
         self.out.triangles.push(triangle);
     }
@@ -218,12 +220,12 @@ pub(super) fn weave(triangles: &[[u32; 3]], vertices: usize) -> Woven {
         plane: [0; 3],
         out: Woven::default(),
     };
-    let mut front = Front::new(0, vertices);
+    let (mut front, _) = Front::new(vertices, vertices);
     for triangle in 0..triangles.len() {
         if !weaver.woven[triangle] {
-            weaver.start(triangle, &mut front);
-            while !front.is_closed {
-                weaver.step(&mut front);
+            let mut at = weaver.start(triangle, &mut front);
+            while !at.is_closed {
+                weaver.step(&mut front, &mut at);
             }
         }
     }
