@@ -7,7 +7,7 @@ use super::streams::{FIXED, KEYS, OF_POINTS, RARE, STREAMS, TOKENS, table_of};
 use super::values::{BASES, EXTRA_BITS, class_of, folded};
 use super::weave::{Woven, weave};
 use super::{points, predict};
-use crate::hybrid::Page;
+use crate::hybrid::{Page, stored};
 
 /// A page ready to be coded, under any model.
 #[derive(Clone, Debug)]
@@ -116,7 +116,10 @@ impl Prepared {
         for (class, key) in self.key_classes.iter().zip(&self.keys) {
             bits.put(*key, points::bits_of(*class));
         }
-        let raw = bits.bytes();
+        let mut raw = bits.bytes();
+        // No page may promise much with few bytes.
+        let held = self.page.positions.len() + self.page.triangles.len();
+        raw.resize(raw.len().max(held.div_ceil(stored::MOST_PER_BYTE as usize)), 0);
         let mut out = Vec::new();
         for count in [self.tokens.len(), self.rare.len(), raw.len()] {
             put_varint(count, &mut out);
