@@ -36,7 +36,8 @@ impl Mesh {
         let word = |at: usize| u32::from_le_bytes(words[at]);
         let (vertices, triangles) = (word(0) as usize, word(1) as usize);
         let float = |at: usize| f32::from_bits(word(2 + at));
-        let positions = (0..vertices).map(|at| Vec3::new(float(3 * at), float(3 * at + 1), float(3 * at + 2))).collect();
+        let positions =
+            (0..vertices).map(|at| Vec3::new(float(3 * at), float(3 * at + 1), float(3 * at + 2))).collect();
         let corner = |at: usize| word(2 + 3 * vertices + at);
         Self::new(positions, (0..triangles).map(|at| [0, 1, 2].map(|side| corner(3 * at + side))).collect())
     }
@@ -55,7 +56,8 @@ impl Mesh {
                 let height = std::f32::consts::PI * (ring as f32 + 0.3 * noise()) / rings as f32;
                 let around = std::f32::consts::TAU * (side as f32 + 0.3 * noise()) / sides as f32;
                 let radius = 1.0 + 0.0006 * noise() + 0.05 * (9.0 * height).sin() * (7.0 * around).sin();
-                positions.push(radius * Vec3::new(height.sin() * around.cos(), height.cos(), height.sin() * around.sin()));
+                positions
+                    .push(radius * Vec3::new(height.sin() * around.cos(), height.cos(), height.sin() * around.sin()));
             }
         }
         let mut triangles = Vec::new();
@@ -73,8 +75,7 @@ impl Mesh {
 fn code(normal: Vec3) -> u32 {
     let sum = normal.x.abs() + normal.y.abs() + normal.z.abs();
     let (x, y) = if sum > 0.0 { (normal.x / sum, normal.y / sum) } else { (0.0, 0.0) };
-    let (x, y) =
-        if normal.z < 0.0 { ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)) } else { (x, y) };
+    let (x, y) = if normal.z < 0.0 { ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)) } else { (x, y) };
     let [u, v] = [x, y].map(|c| ((c * 0.5 + 0.5) * ((1 << NORMAL_BITS) - 1) as f32 + 0.5) as u32);
     u | v << 16
 }
@@ -96,7 +97,8 @@ fn pages(mesh: &Mesh, cell_bits: u32, most: usize) -> Vec<(Page, u32, [u16; 3])>
                 eighths[above.bitmask() as usize].push(triangle);
             }
             for (eighth, triangles) in eighths.into_iter().enumerate() {
-                let offset = Vec3::from_array([0, 1, 2].map(|axis| if eighth >> axis & 1 == 0 { 0.0 } else { edge / 2.0 }));
+                let offset =
+                    Vec3::from_array([0, 1, 2].map(|axis| if eighth >> axis & 1 == 0 { 0.0 } else { edge / 2.0 }));
                 stack.push((corner + offset, edge / 2.0, triangles));
             }
             continue;

@@ -109,7 +109,10 @@ impl NodeRecord {
             if self.vertices + self.points == 0 {
                 place = place.clamp(0, (1 << PLACE_BITS) - 1);
             }
-            assert!(place >> PLACE_BITS == 0, "node {number} is {place} steps from its parent's place less {PLACE_OFFSET}");
+            assert!(
+                place >> PLACE_BITS == 0,
+                "node {number} is {place} steps from its parent's place less {PLACE_OFFSET}"
+            );
             packed |= (place as u64) << (axis as u32 * PLACE_BITS);
         }
         let stored = self.as_stored();
@@ -177,7 +180,9 @@ impl NodeRecord {
         let held = u64::from(self.vertices) + u64::from(self.triangles) + u64::from(self.points);
         if held > MOST_PER_BYTE * u64::from(self.bytes) {
             let bytes = self.bytes;
-            return Some(format!("{held} vertices, triangles and points in {bytes} bytes, expected at most {MOST_PER_BYTE} a byte"));
+            return Some(format!(
+                "{held} vertices, triangles and points in {bytes} bytes, expected at most {MOST_PER_BYTE} a byte"
+            ));
         }
         None
     }
@@ -237,7 +242,9 @@ impl Skeleton {
         let expected = u128::from(root.nodes) * RECORD_BYTES as u128 + u128::from(model_bytes);
         if root.nodes == 0 || expected != rest.len() as u128 {
             let (nodes, found) = (root.nodes, bytes.len());
-            return Err(invalid(format!("{nodes} nodes and {model_bytes} bytes of model in {found} bytes of skeleton")));
+            return Err(invalid(format!(
+                "{nodes} nodes and {model_bytes} bytes of model in {found} bytes of skeleton"
+            )));
         }
         let (records, model) = rest.split_at(rest.len() - model_bytes as usize);
         let nodes = parse_nodes(records)?;
@@ -263,8 +270,7 @@ fn parse_root(bytes: &[u8]) -> Result<(Root, u32), FormatError> {
     let (origin, edge) = (vector(&mut fields), fields.f64());
     let bounds = Aabb { min: vector(&mut fields), max: vector(&mut fields) };
     let (nodes, leaves, levels) = (fields.u64(), fields.u64(), fields.u32());
-    let (cell_bits, normal_bits, flags, _) =
-        (u32::from(fields.u8()), u32::from(fields.u8()), fields.u8(), fields.u8());
+    let (cell_bits, normal_bits, flags, _) = (u32::from(fields.u8()), u32::from(fields.u8()), fields.u8(), fields.u8());
     let (resolution, model_bytes) = (fields.u32(), fields.u32());
     let finite = origin.is_finite() && bounds.min.is_finite() && bounds.max.is_finite();
     if !finite || bounds.is_empty() || !(edge > 0.0 && edge <= f64::MAX) {
@@ -328,8 +334,8 @@ fn parse_nodes(records: &[u8]) -> Result<Vec<NodeRecord>, FormatError> {
         }
         for axis in 0..3 {
             let steps = places[axis] + place[axis];
-            node.min_steps[axis] =
-                i32::try_from(steps).map_err(|_| invalid(format!("{steps} steps from the origin, expected 32 bits")))?;
+            node.min_steps[axis] = i32::try_from(steps)
+                .map_err(|_| invalid(format!("{steps} steps from the origin, expected 32 bits")))?;
         }
         if node.children > 8 || node.children as usize > count - next_child {
             let (found, left) = (node.children, count - next_child);

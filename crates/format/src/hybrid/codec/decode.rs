@@ -25,7 +25,8 @@ struct Streams {
 
 impl Streams {
     fn read(mut bytes: &[u8], model: &Model, record: &NodeRecord, root: &Root) -> Option<Self> {
-        let (vertices, points, triangles) = (record.vertices as usize, record.points as usize, record.triangles as usize);
+        let (vertices, points, triangles) =
+            (record.vertices as usize, record.points as usize, record.triangles as usize);
         let [tokens, rare, raw] = [varint(&mut bytes)?, varint(&mut bytes)?, varint(&mut bytes)?];
         // Each token has a step: a triangle, or one of three edges that nothing is joined to.
         if tokens > 4 * triangles || rare > 8 * triangles {
@@ -44,9 +45,8 @@ impl Streams {
             }
         }
         let (states, rest) = bytes.split_first_chunk::<{ 4 * LANES }>()?;
-        let states = std::array::from_fn(|lane| {
-            u32::from_le_bytes(std::array::from_fn(|byte| states[4 * lane + byte]))
-        });
+        let states =
+            std::array::from_fn(|lane| u32::from_le_bytes(std::array::from_fn(|byte| states[4 * lane + byte])));
         let (words, raw) = rest.split_at_checked(rest.len().checked_sub(raw)?)?;
         let mut reader = Reader::new(states, words)?;
         let mut symbols = |table, count| {
@@ -155,8 +155,7 @@ impl Weaving<'_> {
             }
             let (added, end) = (token / weave::ENDS, token % weave::ENDS);
             if added > 0 {
-                let [a, mut b, mut c] =
-                    [at.from, at.to, at.opposite].map(|vertex| self.positions[vertex as usize]);
+                let [a, mut b, mut c] = [at.from, at.to, at.opposite].map(|vertex| self.positions[vertex as usize]);
                 let plane = Plane::of(a, b, c);
                 for _ in 0..added {
                     let vertex = self.vertex(&mut next, parallelogram(a, b, c), &plane)?;

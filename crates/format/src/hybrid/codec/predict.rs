@@ -49,8 +49,7 @@ impl Plane {
             2
         };
         let across = normal[axis];
-        let slopes =
-            if across == 0.0 { [0.0; 2] } else { [1, 2].map(|next| -normal[(axis + next) % 3] / across) };
+        let slopes = if across == 0.0 { [0.0; 2] } else { [1, 2].map(|next| -normal[(axis + next) % 3] / across) };
         Self { axis, slopes }
     }
 
@@ -163,6 +162,7 @@ pub(super) fn color_differences(color: [u8; 4], guess: [u8; 4]) -> [u32; 3] {
 #[inline(always)]
 pub(super) fn color_from(guess: [u8; 4], differences: [u8; 3]) -> [u8; 4] {
     let [green, red, blue] = differences;
-    let add = |channel: usize, more: u8| guess[channel].wrapping_add(more).wrapping_add(if channel == 1 { 0 } else { green });
+    let add =
+        |channel: usize, more: u8| guess[channel].wrapping_add(more).wrapping_add(if channel == 1 { 0 } else { green });
     [add(0, red), add(1, green), add(2, blue), 255]
 }

@@ -52,8 +52,16 @@ impl Prepared {
         positions(&page, &woven, &mut differences);
         vertex_normals(&page, vertices, normal_bits, &mut differences);
         colors(&page, vertices, &mut differences);
-        let mut prepared =
-            Self { page, vertices, tokens: woven.tokens, rare: woven.rare, key_classes: Vec::new(), keys: Vec::new(), shift, differences };
+        let mut prepared = Self {
+            page,
+            vertices,
+            tokens: woven.tokens,
+            rare: woven.rare,
+            key_classes: Vec::new(),
+            keys: Vec::new(),
+            shift,
+            differences,
+        };
         prepared.points(normal_bits);
         prepared
     }
@@ -176,7 +184,10 @@ fn vertex_normals(page: &Page, vertices: usize, normal_bits: u32, differences: &
         let code = [(normal & 0xFFFF) as i32, (normal >> 16) as i32];
         let guess = octahedral(direction, most);
         for coordinate in 0..2 {
-            assert!(code[coordinate] >> normal_bits == 0, "a normal's code {normal:#010x}, expected {normal_bits} bits");
+            assert!(
+                code[coordinate] >> normal_bits == 0,
+                "a normal's code {normal:#010x}, expected {normal_bits} bits"
+            );
             differences[3 + coordinate].push(predict::difference(code[coordinate], guess[coordinate], normal_bits));
         }
     }

@@ -18,7 +18,8 @@ const fn bases() -> [u32; SYMBOLS] {
     let mut class = 0;
     while class < SYMBOLS {
         let above = class as u32 - if class as u32 > SINGLE { SINGLE } else { class as u32 };
-        bases[class] = if class as u32 <= SINGLE { class as u32 } else { (2 + above % 2) << (2 + above / 2) & 0xFFFF_FFFF };
+        bases[class] =
+            if class as u32 <= SINGLE { class as u32 } else { (2 + above % 2) << (2 + above / 2) & 0xFFFF_FFFF };
         class += 1;
     }
     bases
