@@ -53,16 +53,7 @@ impl Page {
     /// # Errors
     /// [`FormatError::Invalid`].
     pub fn decode(bytes: &[u8], skeleton: &Skeleton, node: NodeId) -> Result<Self, FormatError> {
-        let record = skeleton.record(node);
-        let page = codec::decode(bytes, skeleton.model(), record, skeleton.root())
-            .ok_or_else(|| FormatError::invalid(format!("page {node}"), "its code makes no sense"))?;
-        let most = page.positions.iter().fold([0; 3], |most, position| {
-            [most[0].max(position[0]), most[1].max(position[1]), most[2].max(position[2])]
-        });
-        if (0..3).any(|axis| most[axis] > record.extent_steps[axis]) {
-            let problem = format!("positions up to {most:?}, expected at most {:?}", record.extent_steps);
-            return Err(FormatError::invalid(format!("page {node}"), problem));
-        }
-        Ok(page)
+        codec::decode(bytes, skeleton.model(), skeleton.record(node), skeleton.root())
+            .ok_or_else(|| FormatError::invalid(format!("page {node}"), "its code makes no sense"))
     }
 }

@@ -4,7 +4,7 @@
 //! What always holds: bytes whatever end in a page of exactly as many vertices, triangles, points and borders as asked for, or in `None`,
 //! after work and memory in proportion to these.
 
-use super::front::{self, At, Front};
+use super::front::{self, Store};
 use super::lanes::{BitReader, LANES, Reader};
 use super::model::Model;
 use super::predict::{self, Plane, parallelogram};
@@ -12,6 +12,7 @@ use super::streams::{self, KEYS, OF_POINTS, RARE, SIZES, STREAMS, TOKENS, table_
 use super::values::unfolded;
 use super::{points, weave};
 use crate::hybrid::{NodeRecord, Page, Root};
+use glam::Vec4;
 
 /// Symbols of all streams, and the bits that belong to them.
 struct Streams {
@@ -87,176 +88,139 @@ fn varint(bytes: &mut &[u8]) -> Option<usize> {
     None
 }
 
-/// What grows while the front moves.
+/// What the triangles are made from, and what they become.
 struct Weaving<'a> {
-    front: Front,
-    rare: std::slice::Iter<'a, u32>,
-    steps: &'a [[i16; 3]],
-    positions: Vec<[u16; 3]>,
-    triangles: Vec<[u32; 3]>,
-    borders: Vec<[u32; 2]>,
+    tokens: &'a [u8],
+    rare: &'a [u32],
+    steps: &'a [Vec4],
+    points: &'a mut [Vec4],
+    triangles: &'a mut [[u32; 3]],
+    borders: &'a mut Vec<[u32; 2]>,
     most_borders: usize,
 }
 
-/// How far it has come: numbers of the next vertex and triangle.
-#[derive(Clone, Copy)]
-struct Next {
-    vertex: u32,
-    triangle: usize,
+/// All triangles, and the vertices that have none. What changes with each triangle is kept in variables.
+#[inline(never)]
+fn weave(weaving: Weaving<'_>) -> Option<()> {
+    let Weaving { tokens, rare, steps, points, triangles, borders, most_borders } = weaving;
+    let mut store = Store::new(points.len() + rare.len() + tokens.len(), points.len());
+    let (mut front, mut at) = store.front();
+    let mut rare = rare.iter();
+    let (mut next_vertex, mut triangles) = (0, triangles.iter_mut());
+    for token in tokens {
+        if at.is_closed {
+            let mut corners = [0; 3];
+            for corner in &mut corners {
+                *corner = match *rare.next()? {
+                    0 => {
+                        place_alone(points, steps, next_vertex)?;
+                        next_vertex += 1;
+                        next_vertex - 1
+                    }
+                    back => next_vertex.checked_sub(back)?,
+                };
+            }
+            *triangles.next()? = corners;
+            front.start(&mut at, corners);
+        }
+        let (added, end) = (token / weave::ENDS, token % weave::ENDS);
+        if added > 0 {
+            let [a, mut b, mut c] = [at.from, at.to, at.opposite].map(|vertex| points[vertex as usize]);
+            let plane = Plane::of(a, b, c);
+            for _ in 0..added {
+                let step = *steps.get(next_vertex as usize)?;
+                let point = plane.position(parallelogram(a, b, c), step);
+                *points.get_mut(next_vertex as usize)? = point;
+                (c, b) = (b, point);
+                *triangles.next()? = front.add(&mut at, next_vertex);
+                next_vertex += 1;
+            }
+            if u32::from(added) >= weave::MOST_ADDED {
+                continue;
+            }
+        }
+        *triangles.next()? = match end {
+            weave::CLOSE => front.close(&mut at)?,
+            weave::BORDER => {
+                if borders.len() >= most_borders {
+                    return None;
+                }
+                borders.push([at.from, at.to]);
+                front.end(&mut at);
+                continue;
+            }
+            weave::SKIP => front.skip(&mut at)?,
+            weave::BACK => front.join_back(&mut at, front::BACK)?,
+            _ => match *rare.next()? {
+                weave::SEAM => {
+                    front.end(&mut at);
+                    continue;
+                }
+                back @ 1..weave::TO_KNOWN => front.join_back(&mut at, front::BACK + back)?,
+                ago => front.join(&mut at, next_vertex.checked_sub(ago - weave::TO_KNOWN + 1)?),
+            },
+        };
+    }
+    for vertex in next_vertex..points.len() as u32 {
+        place_alone(points, steps, vertex)?;
+    }
+    (at.is_closed && rare.len() == 0 && triangles.len() == 0).then_some(())
 }
 
-impl Weaving<'_> {
-    /// Places the next vertex.
-    #[inline(always)]
-    fn vertex(&mut self, next: &mut Next, guess: [i32; 3], plane: &Plane) -> Option<u32> {
-        let vertex = next.vertex;
-        let step = *self.steps.get(vertex as usize)?;
-        *self.positions.get_mut(vertex as usize)? = plane.position(guess, step);
-        next.vertex += 1;
-        Some(vertex)
-    }
-
-    /// One that begins a component, or has no triangle.
-    fn vertex_alone(&mut self, next: &mut Next) -> Option<u32> {
-        let before = next.vertex.checked_sub(1);
-        let guess = before.map_or([0; 3], |before| self.positions[before as usize].map(i32::from));
-        self.vertex(next, guess, &Plane::NONE)
-    }
-
-    #[inline(always)]
-    fn triangle(&mut self, next: &mut Next, triangle: [u32; 3]) -> Option<()> {
-        *self.triangles.get_mut(next.triangle)? = triangle;
-        next.triangle += 1;
-        Some(())
-    }
-
-    #[inline(never)]
-    fn start(&mut self, next: &mut Next) -> Option<At> {
-        let mut corners = [0; 3];
-        for corner in &mut corners {
-            *corner = match *self.rare.next()? {
-                0 => self.vertex_alone(next)?,
-                back => next.vertex.checked_sub(back)?,
-            };
-        }
-        self.triangle(next, corners)?;
-        Some(self.front.start(corners))
-    }
-
-    /// All triangles. What changes with each is kept in variables of its own.
-    #[inline(never)]
-    fn weave(&mut self, mut at: At, tokens: &[u8]) -> Option<Next> {
-        let mut next = Next { vertex: 0, triangle: 0 };
-        for token in tokens {
-            if at.is_closed {
-                let mut after = next;
-                at = self.start(&mut after)?;
-                next = after;
-            }
-            let (added, end) = (token / weave::ENDS, token % weave::ENDS);
-            if added > 0 {
-                let [a, mut b, mut c] = [at.from, at.to, at.opposite].map(|vertex| self.positions[vertex as usize]);
-                let plane = Plane::of(a, b, c);
-                for _ in 0..added {
-                    let vertex = self.vertex(&mut next, parallelogram(a, b, c), &plane)?;
-                    (c, b) = (b, self.positions[vertex as usize]);
-                    let triangle = self.front.add(&mut at, vertex);
-                    self.triangle(&mut next, triangle)?;
-                }
-                if u32::from(added) >= weave::MOST_ADDED {
-                    continue;
-                }
-            }
-            let triangle = match end {
-                weave::CLOSE => self.front.close(&mut at)?,
-                weave::BORDER => {
-                    if self.borders.len() >= self.most_borders {
-                        return None;
-                    }
-                    self.borders.push([at.from, at.to]);
-                    self.front.end(&mut at);
-                    continue;
-                }
-                weave::SKIP => self.front.skip(&mut at)?,
-                weave::BACK => self.front.join_back(&mut at, front::BACK)?,
-                _ => {
-                    let triangle;
-                    (at, triangle) = self.rare(at, next.vertex)?;
-                    match triangle {
-                        Some(triangle) => triangle,
-                        None => continue,
-                    }
-                }
-            };
-            self.triangle(&mut next, triangle)?;
-        }
-        at.is_closed.then_some(next)
-    }
-
-    #[inline(never)]
-    fn rare(&mut self, mut at: At, known: u32) -> Option<(At, Option<[u32; 3]>)> {
-        let triangle = match *self.rare.next()? {
-            weave::SEAM => {
-                self.front.end(&mut at);
-                None
-            }
-            back @ 1..weave::TO_KNOWN => Some(self.front.join_back(&mut at, front::BACK + back)?),
-            ago => {
-                let triangle;
-                (at, triangle) = self.front.join(at, known.checked_sub(ago - weave::TO_KNOWN + 1)?);
-                Some(triangle)
-            }
-        };
-        Some((at, triangle))
-    }
+/// Places a vertex that begins a component or has no triangle.
+fn place_alone(points: &mut [Vec4], steps: &[Vec4], vertex: u32) -> Option<()> {
+    let before = vertex.checked_sub(1).map_or(Vec4::ZERO, |before| points[before as usize]);
+    *points.get_mut(vertex as usize)? = Plane::NONE.position(before, *steps.get(vertex as usize)?);
+    Some(())
 }
 
 /// Undoes [`super::Prepared::encode`].
 pub(in super::super) fn decode(bytes: &[u8], model: &Model, record: &NodeRecord, root: &Root) -> Option<Page> {
     let (vertices, points, triangles) = (record.vertices as usize, record.points as usize, record.triangles as usize);
     let mut streams = Streams::read(bytes, model, record, root)?;
-    let mut steps = vec![[0; 3]; vertices];
+    let mut steps = vec![Vec4::ZERO; vertices];
     for coordinate in 0..3 {
-        streams.bits.numbers(&streams.classes[coordinate], &mut steps, |step: &mut [i16; 3], number| {
-            step[coordinate] = unfolded(number) as i16;
+        streams.bits.numbers(&streams.classes[coordinate], &mut steps, |step, number| {
+            step[coordinate] = unfolded(number) as f32;
         })?;
     }
-    let (front, at) = Front::new(vertices + vertices / 4 + 64, vertices);
-    let mut weaving = Weaving {
-        front,
-        rare: streams.rare.iter(),
-        steps: &steps,
+    let mut known = vec![Vec4::ZERO; vertices];
+    let mut page = Page {
         positions: vec![[0; 3]; vertices + points],
         triangles: vec![[0; 3]; triangles],
         borders: Vec::with_capacity(record.borders as usize),
-        most_borders: record.borders as usize,
+        ..Page::default()
     };
-    let mut next = weaving.weave(at, &streams.tokens)?;
-    while (next.vertex as usize) < vertices {
-        weaving.vertex_alone(&mut next)?;
-    }
-    let Weaving { rare, positions, triangles: woven, borders, .. } = weaving;
-    if rare.len() > 0 || next.triangle != triangles || borders.len() != record.borders as usize {
+    weave(Weaving {
+        tokens: &streams.tokens,
+        rare: &streams.rare,
+        steps: &steps,
+        points: &mut known,
+        triangles: &mut page.triangles,
+        borders: &mut page.borders,
+        most_borders: record.borders as usize,
+    })?;
+    if page.borders.len() != record.borders as usize {
         return None;
     }
-    let mut page = Page { positions, triangles: woven, borders, ..Page::default() };
-    vertex_normals(&mut page, &mut streams, vertices, root.normal_bits)?;
+    predict::positions(&known, record.extent_steps, &mut page.positions)?;
+    vertex_normals(&mut page, &mut streams, &known, root.normal_bits)?;
     if root.has_colors {
         vertex_colors(&mut page, &mut streams, vertices)?;
     }
-    all_points(&mut page, &mut streams, vertices, root)?;
+    all_points(&mut page, &mut streams, record, root)?;
     streams.bits.is_within().then_some(page)
 }
 
-fn vertex_normals(page: &mut Page, streams: &mut Streams, vertices: usize, bits: u32) -> Option<()> {
+fn vertex_normals(page: &mut Page, streams: &mut Streams, known: &[Vec4], bits: u32) -> Option<()> {
     let most = ((1 << bits) - 1) as f32;
     let mask = (1 << bits) - 1;
-    let mut differences = vec![[0; 2]; vertices];
+    let mut differences = vec![[0; 2]; known.len()];
     for coordinate in 0..2 {
         let set = |difference: &mut [u16; 2], number: u32| difference[coordinate] = number as u16;
         streams.bits.numbers(&streams.classes[3 + coordinate], &mut differences, set)?;
     }
-    let sums = predict::normals(&page.positions, &page.triangles, vertices);
+    let sums = predict::normals(known, &page.triangles);
     page.normals.reserve_exact(page.positions.len());
     page.normals.extend(sums.iter().zip(differences).map(|(sum, [u, v])| {
         let [guess_u, guess_v] = predict::octahedral(*sum, most);
@@ -277,7 +241,7 @@ fn vertex_colors(page: &mut Page, streams: &mut Streams, vertices: usize) -> Opt
     Some(())
 }
 
-fn all_points(page: &mut Page, streams: &mut Streams, vertices: usize, root: &Root) -> Option<()> {
+fn all_points(page: &mut Page, streams: &mut Streams, record: &NodeRecord, root: &Root) -> Option<()> {
     let number = |number: u32| number;
     let [u, v] = [streams.numbers(OF_POINTS, number)?, streams.numbers(OF_POINTS + 1, number)?];
     let mask = (1 << root.normal_bits) - 1;
@@ -295,11 +259,14 @@ fn all_points(page: &mut Page, streams: &mut Streams, vertices: usize, root: &Ro
         before = predict::color_from(before, [green, red, blue]);
         page.colors.push(before);
     }
-    let mut key = 0;
-    for (class, position) in streams.keys.iter().zip(&mut page.positions[vertices..]) {
+    let (mut key, most) = (0, record.extent_steps);
+    for (class, position) in streams.keys.iter().zip(&mut page.positions[record.vertices as usize..]) {
         let bits = streams.bits.bits(points::bits_of(*class))?;
         key = points::key_from(*class, key, bits);
         *position = points::position_of(key).map(|coordinate| coordinate << streams.shift);
+        if (0..3).any(|axis| position[axis] > most[axis]) {
+            return None;
+        }
     }
     Some(())
 }

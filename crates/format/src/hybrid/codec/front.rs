@@ -36,32 +36,47 @@ pub(super) struct At {
     pub(super) from: u32,
     pub(super) to: u32,
     pub(super) opposite: u32,
+    /// Slots that were given out.
+    used: u32,
     /// True when no ring has a live edge.
     pub(super) is_closed: bool,
 }
 
-/// All rings.
+/// What the rings are kept in.
 #[derive(Debug)]
-pub(super) struct Front {
+pub(super) struct Store {
     slots: Vec<Slot>,
-    /// Slots that were given out.
-    used: u32,
-    /// The slot that a vertex got last.
     slot_of: Vec<u32>,
-    /// A slot of each ring that waits.
     waiting: Vec<u32>,
 }
 
-impl Front {
-    /// None yet, with room for some slots.
-    pub(super) fn new(slots: usize, vertices: usize) -> (Self, At) {
-        let front = Self {
-            slots: vec![Slot::default(); slots.max(16)],
-            used: 0,
-            slot_of: vec![0; vertices],
-            waiting: Vec::new(),
-        };
+impl Store {
+    /// Room for so many slots: each vertex that is added, joined or begun with needs one, and each border.
+    pub(super) fn new(slots: usize, vertices: usize) -> Self {
+        Self { slots: vec![Slot::default(); slots], slot_of: vec![0; vertices], waiting: Vec::new() }
+    }
+
+    /// No ring yet.
+    pub(super) fn front(&mut self) -> (Front<'_>, At) {
+        let front = Front { slots: &mut self.slots, slot_of: &mut self.slot_of, waiting: &mut self.waiting };
         (front, At { is_closed: true, ..At::default() })
+    }
+}
+
+/// All rings. What is seldom done gets a copy of the references, so that these stay in registers.
+#[derive(Debug)]
+pub(super) struct Front<'a> {
+    slots: &'a mut [Slot],
+    /// The slot that a vertex got last.
+    slot_of: &'a mut [u32],
+    /// A slot of each ring that waits.
+    waiting: &'a mut Vec<u32>,
+}
+
+impl Front<'_> {
+    #[inline(always)]
+    fn lent(&mut self) -> Front<'_> {
+        Front { slots: self.slots, slot_of: self.slot_of, waiting: self.waiting }
     }
 
     #[inline(always)]
@@ -70,39 +85,38 @@ impl Front {
     }
 
     #[inline(always)]
-    fn give(&mut self, slot: Slot) -> u32 {
-        let at = self.used;
-        if at as usize >= self.slots.len() {
-            self.grow();
-        }
-        *self.slot(at) = slot;
-        self.used += 1;
-        at
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn grow(&mut self) {
-        self.slots.resize(2 * self.slots.len(), Slot::default());
+    fn give(&mut self, at: &mut At, slot: Slot) -> u32 {
+        let given = at.used;
+        *self.slot(given) = slot;
+        at.used += 1;
+        given
     }
 
     /// A new ring around one triangle.
+    #[inline(always)]
+    pub(super) fn start(&mut self, at: &mut At, corners: [u32; 3]) {
+        *at = self.lent().started(*at, corners);
+    }
+
     #[inline(never)]
-    pub(super) fn start(&mut self, [a, b, c]: [u32; 3]) -> At {
-        let first = self.used;
+    fn started(self, mut at: At, [a, b, c]: [u32; 3]) -> At {
+        let first = at.used;
         for (slot, vertex) in (first..).zip([a, b, c]) {
             self.slot_of[vertex as usize] = slot;
         }
-        self.give(Slot { vertex: a, next: first + 1, previous: first + 2, opposite: c });
-        self.give(Slot { vertex: b, next: first + 2, previous: first, opposite: a });
-        self.give(Slot { vertex: c, next: first, previous: first + 1, opposite: b });
-        At { focus: first, after: first + 1, from: a, to: b, opposite: c, is_closed: false }
+        self.slots[first as usize..][..3].copy_from_slice(&[
+            Slot { vertex: a, next: first + 1, previous: first + 2, opposite: c },
+            Slot { vertex: b, next: first + 2, previous: first, opposite: a },
+            Slot { vertex: c, next: first, previous: first + 1, opposite: b },
+        ]);
+        at.used += 3;
+        At { focus: first, after: first + 1, from: a, to: b, opposite: c, is_closed: false, ..at }
     }
 
     /// Joins a triangle with a vertex that is put between the two.
     #[inline(always)]
     pub(super) fn add(&mut self, at: &mut At, vertex: u32) -> [u32; 3] {
-        let slot = self.give(Slot { vertex, next: at.after, previous: at.focus, opposite: at.from });
+        let slot = self.give(at, Slot { vertex, next: at.after, previous: at.focus, opposite: at.from });
         self.slot(at.after).previous = slot;
         self.slot(at.focus).next = slot;
         self.slot_of[vertex as usize] = slot;
@@ -147,7 +161,7 @@ impl Front {
         self.slot(after).previous = before;
         (at.focus, at.opposite, at.from) = (before, at.from, vertex);
         if self.slot(after).next == before {
-            *at = self.retire(before, after);
+            *at = self.lent().retire(*at, before, after);
         }
         Some(triangle)
     }
@@ -171,18 +185,25 @@ impl Front {
         let hole = if self.slot(third).vertex == HOLE {
             third
         } else {
-            let hole = self.give(Slot { vertex: HOLE, next: after, previous: focus, opposite: HOLE });
+            let hole = self.give(at, Slot { vertex: HOLE, next: after, previous: focus, opposite: HOLE });
             self.slot(after).previous = hole;
             hole
         };
         self.slot(focus).next = hole;
         self.slot(hole).previous = focus;
-        *at = self.settle(focus);
+        *at = self.lent().settle(*at, focus);
     }
 
     /// Joins a triangle with a vertex that is known. Where that still has a slot, the ring becomes two there, or two become one.
+    #[inline(always)]
+    pub(super) fn join(&mut self, at: &mut At, vertex: u32) -> [u32; 3] {
+        let triangle;
+        (*at, triangle) = self.lent().joined(*at, vertex);
+        triangle
+    }
+
     #[inline(never)]
-    pub(super) fn join(&mut self, mut at: At, vertex: u32) -> (At, [u32; 3]) {
+    fn joined(mut self, mut at: At, vertex: u32) -> (At, [u32; 3]) {
         let slot = self.slot_of[vertex as usize];
         let is_there = self.is_live(slot) && self.slot(slot).vertex == vertex;
         let triangle = if is_there && slot != at.focus && slot != at.after {
@@ -228,7 +249,7 @@ impl Front {
     #[inline(always)]
     fn join_slot(&mut self, at: &mut At, slot: u32, vertex: u32) -> [u32; 3] {
         let (focus, after, previous) = (at.focus, at.after, self.slots[slot as usize].previous);
-        let twin = self.give(Slot { vertex, next: after, previous, opposite: at.from });
+        let twin = self.give(at, Slot { vertex, next: after, previous, opposite: at.from });
         self.slot(previous).next = twin;
         self.slot(after).previous = twin;
         self.slot(focus).next = slot;
@@ -241,34 +262,34 @@ impl Front {
 
     /// The ring has only these two slots, with nothing between them any more: another one's turn.
     #[inline(never)]
-    fn retire(&mut self, a: u32, b: u32) -> At {
+    fn retire(mut self, at: At, a: u32, b: u32) -> At {
         self.slot(a).vertex = HOLE;
         self.slot(b).vertex = HOLE;
         loop {
             let Some(slot) = self.waiting.pop() else {
-                return At { is_closed: true, ..At::default() };
+                return At { is_closed: true, ..at };
             };
             if self.is_live(slot) {
-                return self.settle(slot);
+                return self.settle(at, slot);
             }
         }
     }
 
     /// The nearest live edge, backwards.
     #[inline(never)]
-    fn settle(&mut self, mut focus: u32) -> At {
+    fn settle(mut self, at: At, mut focus: u32) -> At {
         loop {
             let Slot { vertex, next, previous, opposite } = *self.slot(focus);
             let to = self.slot(next).vertex;
             if to != HOLE {
-                return At { focus, after: next, from: vertex, to, opposite, is_closed: false };
+                return At { focus, after: next, from: vertex, to, opposite, is_closed: false, ..at };
             }
             if self.slot(previous).vertex != HOLE {
                 focus = previous;
                 continue;
             }
             if previous == next {
-                return self.retire(focus, focus);
+                return self.retire(at, focus, focus);
             }
             // Between two holes: they become one.
             let behind = self.slot(next).next;

@@ -14,22 +14,17 @@ pub(super) struct Plane {
     slopes: [f32; 2],
 }
 
-/// Added to a number below 2^22, it leaves the nearest whole number in the low bits.
+/// Added to a number below 2^22 and taken away again, it leaves the nearest whole number, the even one of two.
 const ROUNDING: f32 = 12_582_912.0;
 
 #[inline(always)]
-fn rounded(number: f32) -> i32 {
-    (number + ROUNDING).to_bits() as i32 - ROUNDING.to_bits() as i32
+fn rounded(number: f32) -> f32 {
+    (number + ROUNDING) - ROUNDING
 }
 
 #[inline(always)]
-fn edge(from: [u16; 3], to: [u16; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|axis| (i32::from(to[axis]) - i32::from(from[axis])) as f32)
-}
-
-#[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+fn cross(a: Vec4, b: Vec4) -> Vec4 {
+    a.yzxw() * b.zxyw() - a.zxyw() * b.yzxw()
 }
 
 impl Plane {
@@ -38,60 +33,75 @@ impl Plane {
 
     /// Through three points.
     #[inline(always)]
-    pub(super) fn of(a: [u16; 3], b: [u16; 3], c: [u16; 3]) -> Self {
-        let normal = cross(edge(a, b), edge(a, c));
-        let [x, y, z] = normal.map(f32::abs);
-        let axis = if x > y && x > z {
-            0
+    pub(super) fn of(a: Vec4, b: Vec4, c: Vec4) -> Self {
+        let normal = cross(b - a, c - a);
+        let [x, y, z, _] = normal.abs().to_array();
+        let [nx, ny, nz, _] = normal.to_array();
+        let (axis, across, first, second) = if x > y && x > z {
+            (0, nx, ny, nz)
         } else if y > z {
-            1
+            (1, ny, nz, nx)
         } else {
-            2
+            (2, nz, nx, ny)
         };
-        let across = normal[axis];
-        let slopes = if across == 0.0 { [0.0; 2] } else { [1, 2].map(|next| -normal[(axis + next) % 3] / across) };
-        Self { axis, slopes }
+        let scale = if across == 0.0 { 0.0 } else { -1.0 / across };
+        Self { axis, slopes: [first * scale, second * scale] }
     }
 
     /// The position that is a step from another.
     #[inline(always)]
-    pub(super) fn position(&self, guess: [i32; 3], [first, second, third]: [i16; 3]) -> [u16; 3] {
-        let follows = rounded(self.slopes[0] * f32::from(first) + self.slopes[1] * f32::from(second));
-        let across = i32::from(third).wrapping_add(follows);
-        let step = match self.axis {
-            0 => [across, i32::from(first), i32::from(second)],
-            1 => [i32::from(second), across, i32::from(first)],
-            _ => [i32::from(first), i32::from(second), across],
-        };
-        [0, 1, 2].map(|axis| guess[axis].wrapping_add(step[axis]) as u16)
+    pub(super) fn position(&self, guess: Vec4, step: Vec4) -> Vec4 {
+        let follows = rounded(self.slopes[0] * step.x + self.slopes[1] * step.y);
+        let step = Vec4::new(step.x, step.y, step.z + follows, 0.0);
+        guess
+            + match self.axis {
+                0 => step.zxyw(),
+                1 => step.yzxw(),
+                _ => step,
+            }
     }
 
     /// Undoes [`Self::position`].
-    pub(super) fn step(&self, guess: [i32; 3], position: [u16; 3]) -> [i16; 3] {
-        let step = [0, 1, 2].map(|axis| i32::from(position[axis]).wrapping_sub(guess[axis]) as i16);
-        let [first, second] = [1, 2].map(|next| step[(self.axis + next) % 3]);
-        let follows = rounded(self.slopes[0] * f32::from(first) + self.slopes[1] * f32::from(second));
-        [first, second, i32::from(step[self.axis]).wrapping_sub(follows) as i16]
+    pub(super) fn step(&self, guess: Vec4, position: Vec4) -> Vec4 {
+        let step = position - guess;
+        let step = match self.axis {
+            0 => step.yzxw(),
+            1 => step.zxyw(),
+            _ => step,
+        };
+        let follows = rounded(self.slopes[0] * step.x + self.slopes[1] * step.y);
+        Vec4::new(step.x, step.y, step.z - follows, 0.0)
     }
+}
+
+/// A position in steps, to reckon with: all numbers stay whole and exact.
+pub(super) fn point([x, y, z]: [u16; 3]) -> Vec4 {
+    Vec4::new(f32::from(x), f32::from(y), f32::from(z), 0.0)
 }
 
 /// The fourth corner of a parallelogram: beyond the edge from `a` to `b`, opposite to `c`.
 #[inline(always)]
-pub(super) fn parallelogram(a: [u16; 3], b: [u16; 3], c: [u16; 3]) -> [i32; 3] {
-    [0, 1, 2].map(|axis| i32::from(a[axis]) + i32::from(b[axis]) - i32::from(c[axis]))
+pub(super) fn parallelogram(a: Vec4, b: Vec4, c: Vec4) -> Vec4 {
+    a + b - c
+}
+
+/// Undoes [`point`]. `None` where one is not from 0 to `most`.
+pub(super) fn positions(points: &[Vec4], most: [u16; 3], out: &mut [[u16; 3]]) -> Option<()> {
+    let most = point(most);
+    let mut good = true;
+    for (point, position) in points.iter().zip(out) {
+        good &= (point.cmpge(Vec4::ZERO) & point.cmple(most)).all();
+        *position = [point.x, point.y, point.z].map(|coordinate| (coordinate + ROUNDING).to_bits() as u16);
+    }
+    good.then_some(())
 }
 
 /// Normals of the vertices: the sum of the crosses of their triangles, in order.
-pub(super) fn normals(positions: &[[u16; 3]], triangles: &[[u32; 3]], vertices: usize) -> Vec<Vec4> {
-    let corners: Vec<Vec4> = positions[..vertices]
-        .iter()
-        .map(|[x, y, z]| Vec4::new(f32::from(*x), f32::from(*y), f32::from(*z), 0.0))
-        .collect();
-    let mut sums = vec![Vec4::ZERO; vertices];
+pub(super) fn normals(points: &[Vec4], triangles: &[[u32; 3]]) -> Vec<Vec4> {
+    let mut sums = vec![Vec4::ZERO; points.len()];
     for triangle in triangles {
-        let [a, b, c] = triangle.map(|vertex| corners[vertex as usize]);
-        let (b, c) = (b - a, c - a);
-        let normal = b.yzxw() * c.zxyw() - b.zxyw() * c.yzxw();
+        let [a, b, c] = triangle.map(|vertex| points[vertex as usize]);
+        let normal = cross(b - a, c - a);
         for vertex in triangle {
             sums[*vertex as usize] += normal;
         }
@@ -108,7 +118,9 @@ pub(super) fn octahedral(direction: Vec4, most: f32) -> [i32; 2] {
     let (x, y) = (x * scale, y * scale);
     let (folded_x, folded_y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
     let (x, y) = if z < 0.0 { (folded_x, folded_y) } else { (x, y) };
-    [x, y].map(|coordinate| rounded((coordinate * 0.5 + 0.5) * most))
+    [x, y].map(|coordinate| {
+        ((coordinate * 0.5 + 0.5) * most + ROUNDING).to_bits() as i32 - ROUNDING.to_bits() as i32
+    })
 }
 
 /// The edge between whose ends the colour of each vertex is expected: where it is the third corner of the first triangle that has it,

@@ -8,6 +8,7 @@ use super::values::{BASES, EXTRA_BITS, class_of, folded};
 use super::weave::{Woven, weave};
 use super::{points, predict};
 use crate::hybrid::{Page, stored};
+use glam::Vec4;
 
 /// A page ready to be coded, under any model.
 #[derive(Clone, Debug)]
@@ -49,8 +50,9 @@ impl Prepared {
             borders: woven.borders.clone(),
         };
         let mut differences: [Vec<u32>; STREAMS.len()] = Default::default();
-        positions(&page, &woven, &mut differences);
-        vertex_normals(&page, vertices, normal_bits, &mut differences);
+        let known: Vec<Vec4> = page.positions[..vertices].iter().copied().map(predict::point).collect();
+        positions(&known, &woven, &mut differences);
+        vertex_normals(&page, &known, normal_bits, &mut differences);
         colors(&page, vertices, &mut differences);
         let mut prepared = Self {
             page,
@@ -165,21 +167,21 @@ fn sorted(page: &Page, vertices: usize, woven: &Woven) -> (Vec<u32>, u32) {
     (order, if used == 0 { 0 } else { used.trailing_zeros() })
 }
 
-fn positions(page: &Page, woven: &Woven, differences: &mut [Vec<u32>; STREAMS.len()]) {
+fn positions(points: &[Vec4], woven: &Woven, differences: &mut [Vec<u32>; STREAMS.len()]) {
     for (vertex, made) in woven.made.iter().enumerate() {
-        let at = |corner: u32| if vertex == 0 { [0; 3] } else { page.positions[corner as usize] };
+        let at = |corner: u32| if vertex == 0 { Vec4::ZERO } else { points[corner as usize] };
         let [a, b, c] = made.beside.map(at);
         let [d, e, f] = made.plane.map(at);
-        let step = Plane::of(d, e, f).step(parallelogram(a, b, c), page.positions[vertex]);
-        for (stream, step) in differences.iter_mut().zip(step) {
-            stream.push(folded(i32::from(step)));
+        let step = Plane::of(d, e, f).step(parallelogram(a, b, c), points[vertex]);
+        for (stream, step) in differences.iter_mut().zip(step.to_array().into_iter().take(3)) {
+            stream.push(folded(step as i32));
         }
     }
 }
 
-fn vertex_normals(page: &Page, vertices: usize, normal_bits: u32, differences: &mut [Vec<u32>; STREAMS.len()]) {
+fn vertex_normals(page: &Page, points: &[Vec4], normal_bits: u32, differences: &mut [Vec<u32>; STREAMS.len()]) {
     let most = ((1 << normal_bits) - 1) as f32;
-    let guesses = normals(&page.positions, &page.triangles, vertices);
+    let guesses = normals(points, &page.triangles);
     for (direction, normal) in guesses.into_iter().zip(&page.normals) {
         let code = [(normal & 0xFFFF) as i32, (normal >> 16) as i32];
         let guess = octahedral(direction, most);

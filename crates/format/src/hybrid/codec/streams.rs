@@ -21,7 +21,7 @@ impl Kind {
     /// Symbols that can occur.
     pub(super) fn symbols(self) -> u32 {
         match self {
-            Self::Position => 34,
+            Self::Position => 42,
             Self::Normal | Self::PointNormal => 26,
             Self::Color | Self::PointColor => 18,
         }

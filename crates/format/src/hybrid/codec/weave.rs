@@ -2,7 +2,7 @@
 //!
 //! In: triangles. Out: the same triangles in the order and with the numbering that a decoder gives them, and what it must be told.
 
-use super::front::{self, At, Front};
+use super::front::{self, At, Front, Store};
 
 /// Most new vertices that one token adds.
 pub(super) const MOST_ADDED: u32 = 6;
@@ -148,7 +148,7 @@ impl Weaver<'_> {
         self.out.rare.push(value);
     }
 
-    fn start(&mut self, triangle: usize, front: &mut Front) -> At {
+    fn start(&mut self, triangle: usize, front: &mut Front<'_>, at: &mut At) {
         self.woven[triangle] = true;
         let corners = self.triangles[triangle].map(|old| {
             let known = self.out.order.len();
@@ -157,10 +157,10 @@ impl Weaver<'_> {
             number
         });
         self.out.triangles.push(corners);
-        front.start(corners)
+        front.start(at, corners);
     }
 
-    fn step(&mut self, front: &mut Front, at: &mut At) {
+    fn step(&mut self, front: &mut Front<'_>, at: &mut At) {
         let [from, to] = [at.from, at.to].map(|new| self.out.order[new as usize]);
         let Some(side) = self.sides.free(to, from, &self.woven) else {
             if self.sides.is_border(from, to) {
@@ -201,9 +201,7 @@ impl Weaver<'_> {
             front.join_back(at, back).expect("it was asked")
         } else {
             self.rare(TO_KNOWN + known - 1 - number);
-            let triangle;
-            (*at, triangle) = front.join(*at, number);
-            triangle
+            front.join(at, number)
         };
         self.out.triangles.push(triangle);
     }
@@ -220,10 +218,12 @@ pub(super) fn weave(triangles: &[[u32; 3]], vertices: usize) -> Woven {
         plane: [0; 3],
         out: Woven::default(),
     };
-    let (mut front, _) = Front::new(vertices, vertices);
+    // Three slots for the corners of each triangle and one for each of its sides are more than enough.
+    let mut store = Store::new(6 * triangles.len(), vertices);
+    let (mut front, mut at) = store.front();
     for triangle in 0..triangles.len() {
         if !weaver.woven[triangle] {
-            let mut at = weaver.start(triangle, &mut front);
+            weaver.start(triangle, &mut front, &mut at);
             while !at.is_closed {
                 weaver.step(&mut front, &mut at);
             }
