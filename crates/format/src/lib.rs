@@ -12,6 +12,7 @@ mod container;
 mod error;
 pub mod hybrid;
 mod metadata;
+mod rans;
 pub mod splats;
 pub mod store;
 

@@ -1,8 +1,8 @@
-//! What the page of a node holds, and its plain bytes.
+//! What the page of a node holds.
 
+use super::codec::{self, Model, Prepared};
 use super::skeleton::{NodeId, Skeleton};
 use crate::FormatError;
-use crate::bytes::Fields;
 
 /// Triangles, points and lines of one node, decoded.
 ///
@@ -33,15 +33,19 @@ impl Page {
             + self.borders.len() * 8
     }
 
-    /// Its bytes on disk.
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        out.extend(self.positions.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-        out.extend(self.normals.iter().flat_map(|x| x.to_le_bytes()));
-        out.extend(self.colors.as_flattened());
-        out.extend(self.triangles.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-        out.extend(self.borders.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-        out
+    /// Edges of just one of these triangles, each as in its triangle, in their order. Sides whose ends are one vertex do not count.
+    pub fn borders_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+        codec::borders_of(triangles)
+    }
+
+    /// Its bytes on disk under a model, and the page as [`Self::decode`] will give it: order and numbering change. The first so
+    /// many positions are of vertices. Borders are found anew.
+    ///
+    /// # Panics
+    /// As [`Prepared::new`].
+    pub fn encode(&self, vertices: u32, normal_bits: u32, model: &Model) -> (Vec<u8>, Self) {
+        let prepared = Prepared::new(self, vertices, normal_bits);
+        (prepared.encode(model), prepared.into_page())
     }
 
     /// Decodes and checks what untrusted bytes say.
@@ -49,29 +53,7 @@ impl Page {
     /// # Errors
     /// [`FormatError::Invalid`].
     pub fn decode(bytes: &[u8], skeleton: &Skeleton, node: NodeId) -> Result<Self, FormatError> {
-        let record = skeleton.record(node);
-        let has_colors = skeleton.root().has_colors;
-        let count = u64::from(record.vertices) + u64::from(record.points);
-        let expected =
-            count * if has_colors { 14 } else { 10 } + u64::from(record.triangles) * 12 + u64::from(record.borders) * 8;
-        let invalid = |problem: String| FormatError::invalid(format!("page {node}"), problem);
-        if bytes.len() as u64 != expected {
-            return Err(invalid(format!("{} bytes, expected {expected}", bytes.len())));
-        }
-        let mut fields = Fields(bytes);
-        let page = Self {
-            positions: (0..count).map(|_| [fields.u16(), fields.u16(), fields.u16()]).collect(),
-            normals: (0..count).map(|_| fields.u32()).collect(),
-            colors: (0..if has_colors { count } else { 0 }).map(|_| [(); 4].map(|()| fields.u8())).collect(),
-            triangles: (0..record.triangles).map(|_| [(); 3].map(|()| fields.u32())).collect(),
-            borders: (0..record.borders).map(|_| [(); 2].map(|()| fields.u32())).collect(),
-        };
-        let used = page.triangles.as_flattened().iter().chain(page.borders.as_flattened());
-        match used.max() {
-            Some(most) if *most >= record.vertices => {
-                Err(invalid(format!("vertex {most}, expected less than {}", record.vertices)))
-            }
-            _ => Ok(page),
-        }
+        codec::decode(bytes, skeleton.model(), skeleton.record(node), skeleton.root())
+            .ok_or_else(|| FormatError::invalid(format!("page {node}"), "its code makes no sense"))
     }
 }

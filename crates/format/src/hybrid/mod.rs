@@ -8,11 +8,15 @@
 //!
 //! Source: the hybrid paper, section 3.
 
+mod codec;
 mod contents;
 pub mod skeleton;
+mod stored;
 
+pub use codec::{Model, PartBits, Prepared, Statistics};
 pub use contents::Page;
 pub use skeleton::{NodeId, NodeRecord, Root, Skeleton};
+pub use stored::{MAX_BORDERS, MAX_LEVELS, MAX_POINTS, MAX_TRIANGLES, MAX_VERTICES};
 
 use crate::container::{Section, read_checked};
 use crate::{Container, FormatError, Kind};

@@ -1,7 +1,7 @@
-//! The skeleton of a hybrid file: what holds for all of it, and a record for each node, coarse ones first.
+//! The skeleton of a hybrid file: what holds for all of it, a record for each node, coarse ones first, and the model that its pages
+//! need. Its bytes are `stored`'s business.
 
-use crate::FormatError;
-use crate::bytes::Fields;
+use super::codec::Model;
 use gigalod_geom::Aabb;
 use gigalod_geom::camera::UpAxis;
 use glam::DVec3;
@@ -86,13 +86,14 @@ pub struct NodeRecord {
     pub checksum: u32,
 }
 
-/// Root and node records.
+/// Root, node records and model.
 #[derive(Clone, Debug)]
 pub struct Skeleton {
     root: Root,
     nodes: Vec<NodeRecord>,
     /// Where each page begins in the file.
     offsets: Vec<u64>,
+    model: Model,
 }
 
 impl Skeleton {
@@ -107,7 +108,17 @@ impl Skeleton {
                 own
             })
             .collect();
-        Self { root, nodes, offsets }
+        Self { root, nodes, offsets, model: Model::default() }
+    }
+
+    /// The same with the model that coded the pages.
+    pub fn with_model(self, model: Model) -> Self {
+        Self { model, ..self }
+    }
+
+    /// What coded the pages.
+    pub fn model(&self) -> &Model {
+        &self.model
     }
 
     /// What holds for the whole hierarchy.
@@ -136,104 +147,5 @@ impl Skeleton {
     /// Length of a step of a level, in model units.
     pub fn step(&self, level: u32) -> f64 {
         self.root.edge / f64::from(1u32 << self.root.cell_bits) / 2f64.powi(level as i32)
-    }
-}
-
-const ROOT_BYTES: usize = 116;
-const RECORD_BYTES: usize = 84;
-
-impl Skeleton {
-    /// Length on disk of the skeleton of so many nodes.
-    pub fn encoded_bytes(nodes: u64) -> u64 {
-        ROOT_BYTES as u64 + nodes * RECORD_BYTES as u64
-    }
-
-    /// Its bytes on disk.
-    pub fn encode(root: &Root, nodes: &[NodeRecord]) -> Vec<u8> {
-        let mut out = Vec::with_capacity(ROOT_BYTES + RECORD_BYTES * nodes.len());
-        out.extend(root.origin.to_array().iter().flat_map(|x| x.to_le_bytes()));
-        out.extend(root.edge.to_le_bytes());
-        out.extend([root.bounds.min, root.bounds.max].iter().flat_map(DVec3::to_array).flat_map(f64::to_le_bytes));
-        out.extend([root.nodes, root.leaves].iter().flat_map(|x| x.to_le_bytes()));
-        out.extend(
-            [root.levels, root.cell_bits, root.normal_bits, root.resolution].iter().flat_map(|x| x.to_le_bytes()),
-        );
-        let flags = [root.preserves_appearance, root.has_colors, root.closed, root.up == UpAxis::Z];
-        out.extend(flags.map(u8::from));
-        out.resize(ROOT_BYTES, 0);
-        for node in nodes {
-            out.extend([node.level, node.first_child, node.children].iter().flat_map(|x| x.to_le_bytes()));
-            out.extend(node.min_steps.iter().flat_map(|x| x.to_le_bytes()));
-            out.extend(node.extent_steps.iter().flat_map(|x| x.to_le_bytes()));
-            out.extend([0; 2]);
-            let [x, y, z] = node.cone_axis;
-            let floats = [node.error_geo, node.error_total, x, y, z, node.cone_sine, node.spacing];
-            out.extend(floats.iter().flat_map(|x| x.to_le_bytes()));
-            let counts = [node.vertices, node.triangles, node.points, node.borders, node.bytes, node.checksum];
-            out.extend(counts.iter().flat_map(|x| x.to_le_bytes()));
-        }
-        out
-    }
-
-    /// Checks and decodes a skeleton.
-    ///
-    /// # Errors
-    /// [`FormatError::Invalid`] naming the record, and [`FormatError::Truncated`] where pages end beyond the file.
-    pub fn parse(bytes: &[u8], pages_offset: u64, file_bytes: u64) -> Result<Self, FormatError> {
-        let invalid = |problem: String| FormatError::invalid("the skeleton", problem);
-        if bytes.len() < ROOT_BYTES || (bytes.len() - ROOT_BYTES) % RECORD_BYTES != 0 {
-            return Err(invalid(format!("{} bytes, expected {ROOT_BYTES} and {RECORD_BYTES} a node", bytes.len())));
-        }
-        let mut fields = Fields(&bytes[..ROOT_BYTES]);
-        let vector = |fields: &mut Fields<'_>| DVec3::new(fields.f64(), fields.f64(), fields.f64());
-        let root = Root {
-            origin: vector(&mut fields),
-            edge: fields.f64(),
-            bounds: Aabb { min: vector(&mut fields), max: vector(&mut fields) },
-            nodes: fields.u64(),
-            leaves: fields.u64(),
-            levels: fields.u32(),
-            cell_bits: fields.u32(),
-            normal_bits: fields.u32(),
-            resolution: fields.u32(),
-            preserves_appearance: fields.u8() != 0,
-            has_colors: fields.u8() != 0,
-            closed: fields.u8() != 0,
-            up: if fields.u8() != 0 { UpAxis::Z } else { UpAxis::Y },
-        };
-        let nodes: Vec<NodeRecord> = bytes[ROOT_BYTES..]
-            .chunks_exact(RECORD_BYTES)
-            .map(|record| {
-                let mut fields = Fields(record);
-                let (level, first_child, children) = (fields.u32(), fields.u32(), fields.u32());
-                let min_steps = [(); 3].map(|()| fields.u32() as i32);
-                let extent_steps = [(); 3].map(|()| fields.u16());
-                fields.u16();
-                NodeRecord {
-                    level,
-                    first_child,
-                    children,
-                    min_steps,
-                    extent_steps,
-                    error_geo: fields.f32(),
-                    error_total: fields.f32(),
-                    cone_axis: [(); 3].map(|()| fields.f32()),
-                    cone_sine: fields.f32(),
-                    spacing: fields.f32(),
-                    vertices: fields.u32(),
-                    triangles: fields.u32(),
-                    points: fields.u32(),
-                    borders: fields.u32(),
-                    bytes: fields.u32(),
-                    checksum: fields.u32(),
-                }
-            })
-            .collect();
-        let skeleton = Self::new(root, nodes, pages_offset);
-        let end = skeleton.nodes.iter().fold(pages_offset, |sum, node| sum.saturating_add(u64::from(node.bytes)));
-        if end > file_bytes {
-            return Err(FormatError::Truncated { what: "the last page".into(), end, file_bytes });
-        }
-        Ok(skeleton)
     }
 }

@@ -7,7 +7,7 @@
 //! one that is not legal has none, so a decoder never sees it.
 
 use super::lister::Symbol;
-use super::rans::{ROW, SCALE, SYMBOLS, Slots, Table};
+use super::rans::{ROW, Slots, Table};
 use crate::FormatError;
 
 /// The first context of each field; each field's contexts are numbered from there.
@@ -82,11 +82,6 @@ pub(super) fn legal(context: usize) -> u64 {
     }
 }
 
-/// Bytes that say which symbols have a frequency of their own.
-fn mask_bytes(legal: u64) -> usize {
-    (64 - legal.leading_zeros() as usize).div_ceil(8)
-}
-
 /// Occurrences of each symbol in each context.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Statistics {
@@ -154,27 +149,11 @@ impl Model {
         &self.tables
     }
 
-    /// For each context as many bytes as its symbols need, with a bit for each symbol of a frequency above 1, then these frequencies but the last, as
-    /// LEB128. No bit: all legal symbols alike.
+    /// The tables of all contexts, in order: see [`crate::rans::Table::put`].
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         for (context, table) in self.tables.iter().enumerate() {
-            let frequencies = table.frequencies();
-            let legal = legal(context);
-            let present = |symbol: &usize| frequencies[*symbol] > 1 && *table != Table::uniform(legal);
-            let mask = (0..SYMBOLS).filter(present).fold(0u64, |mask, symbol| mask | 1 << symbol);
-            out.extend(&mask.to_le_bytes()[..mask_bytes(legal)]);
-            let mut left = mask.count_ones();
-            for symbol in (0..SYMBOLS).filter(present) {
-                left -= 1;
-                if left > 0 {
-                    let frequency = frequencies[symbol];
-                    if frequency >= 128 {
-                        out.push(frequency as u8 | 0x80);
-                    }
-                    out.push(if frequency >= 128 { (frequency >> 7) as u8 } else { frequency as u8 });
-                }
-            }
+            table.put(legal(context), &mut out);
         }
         out
     }
@@ -192,38 +171,8 @@ impl Model {
         };
         let mut tables = Vec::with_capacity(STORED);
         for context in 0..STORED {
-            let legal = legal(context);
-            let mut mask = 0;
-            for at in 0..mask_bytes(legal) {
-                mask |= u64::from(byte()?) << (8 * at);
-            }
-            if mask & !legal != 0 {
-                let problem = format!("context {context} has symbols {mask:#06x}, expected none beyond {legal:#06x}");
-                return Err(FormatError::invalid("the model", problem));
-            }
-            if mask == 0 {
-                tables.push(Table::uniform(legal));
-                continue;
-            }
-            let mut frequencies: [u16; SYMBOLS] = std::array::from_fn(|symbol| (legal >> symbol & 1) as u16);
-            let mut left = SCALE - (legal & !mask).count_ones();
-            for (symbol, frequency) in frequencies.iter_mut().enumerate().filter(|(symbol, _)| mask >> symbol & 1 != 0)
-            {
-                let is_last = mask >> (symbol + 1) == 0;
-                let value = if is_last {
-                    left
-                } else {
-                    let low = u32::from(byte()?);
-                    if low < 128 { low } else { low - 128 + (u32::from(byte()?) << 7) }
-                };
-                if value == 0 || value > left {
-                    let problem = format!("context {context} has frequencies that sum to more than 512, or one of 0");
-                    return Err(FormatError::invalid("the model", problem));
-                }
-                left -= value;
-                *frequency = value as u16;
-            }
-            tables.push(Table::of_frequencies(&frequencies));
+            let wrong = |problem| FormatError::invalid("the model", format!("context {context} {problem}"));
+            tables.push(Table::take(legal(context), &mut byte, wrong)?);
         }
         match rest.count() {
             0 => Ok(Self::with(tables)),

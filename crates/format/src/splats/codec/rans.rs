@@ -10,6 +10,7 @@
 //! arXiv:1402.3392, 2014.
 
 use super::model::{CONTEXTS, STORED};
+pub(super) use crate::rans::LOW;
 
 /// Bits of a probability. What a decoder looks up must stay in a processor's nearest cache: with 10 bits it is a tenth slower, and files
 /// are 0.2 % smaller.
@@ -20,73 +21,9 @@ pub(super) const SCALE: u32 = 1 << SCALE_BITS;
 pub(super) const SYMBOLS: usize = 48;
 /// Places of a context in a table of symbols; one that has more symbols takes several numbers.
 pub(super) const ROW: usize = 16;
-/// States stay at or above this between symbols; all begin here.
-pub(super) const LOW: u32 = 1 << 16;
 
-/// Probabilities of the symbols in one context, as running sums: symbol i has the slots from `ends[i − 1]` up to `ends[i]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Table {
-    /// Not falling; the last is [`SCALE`], or all are 0 where there are no symbols.
-    ends: [u16; SYMBOLS],
-}
-
-impl Table {
-    /// All of some symbols alike, the first taking what is left over.
-    pub(super) fn uniform(legal: u64) -> Self {
-        if legal == 0 {
-            return Self { ends: [0; SYMBOLS] };
-        }
-        let share = (SCALE / legal.count_ones()) as u16;
-        let mut frequencies = std::array::from_fn(|symbol| if legal >> symbol & 1 != 0 { share } else { 0 });
-        frequencies[legal.trailing_zeros() as usize] += (SCALE % legal.count_ones()) as u16;
-        Self::of_frequencies(&frequencies)
-    }
-
-    /// From frequencies that sum to [`SCALE`].
-    pub(super) fn of_frequencies(frequencies: &[u16; SYMBOLS]) -> Self {
-        let mut sum = 0;
-        let ends = frequencies.map(|frequency| {
-            sum += frequency;
-            sum
-        });
-        debug_assert_eq!(u32::from(sum), SCALE);
-        Self { ends }
-    }
-
-    /// Frequencies in proportion to `counts`, at least 1 for each legal symbol.
-    pub(super) fn of_counts(counts: &[u64; SYMBOLS], legal: u64) -> Self {
-        let weights: [u128; SYMBOLS] =
-            std::array::from_fn(|symbol| if legal >> symbol & 1 != 0 { 8 * u128::from(counts[symbol]) + 1 } else { 0 });
-        let total: u128 = weights.iter().sum();
-        if total == u128::from(legal.count_ones()) {
-            return Self::uniform(legal);
-        }
-        let share = |weight| (((weight * u128::from(SCALE) + total / 2) / total) as u16).max(u16::from(weight > 0));
-        let mut frequencies = weights.map(share);
-        // What rounding left over or took too much goes to or comes from the largest, which feel it least.
-        loop {
-            let sum: i32 = frequencies.iter().map(|f| i32::from(*f)).sum();
-            let missing = SCALE as i32 - sum;
-            if missing == 0 {
-                break;
-            }
-            let largest = (0..SYMBOLS).max_by_key(|symbol| (frequencies[*symbol], std::cmp::Reverse(*symbol)));
-            let largest = &mut frequencies[largest.expect("there are symbols")];
-            let step = missing.max(-(i32::from(*largest) - 1).min(16));
-            *largest = (i32::from(*largest) + step) as u16;
-        }
-        Self::of_frequencies(&frequencies)
-    }
-
-    /// Frequencies of all symbols.
-    pub(super) fn frequencies(&self) -> [u16; SYMBOLS] {
-        std::array::from_fn(|symbol| self.ends[symbol] - self.start(symbol))
-    }
-
-    fn start(&self, symbol: usize) -> u16 {
-        if symbol == 0 { 0 } else { self.ends[symbol - 1] }
-    }
-}
+/// Probabilities of the symbols in one context.
+pub(super) type Table = crate::rans::Table<SCALE_BITS, SYMBOLS>;
 
 /// What a decoder looks up.
 #[derive(Clone, Debug)]
@@ -103,7 +40,7 @@ impl Slots {
         let mut shares = vec![0; CONTEXTS * ROW];
         for (context, table) in tables.iter().enumerate() {
             for symbol in 0..SYMBOLS {
-                let (start, end) = (table.start(symbol), table.ends[symbol]);
+                let (start, end) = (table.start(symbol), table.end(symbol));
                 let slots = context * SCALE as usize + usize::from(start)..context * SCALE as usize + usize::from(end);
                 symbols[slots].fill(symbol as u8);
                 if end > start {
