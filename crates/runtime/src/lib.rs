@@ -12,6 +12,7 @@
 
 pub mod controller;
 pub mod fineness;
+pub mod hybrid;
 pub mod magnified;
 pub mod report;
 pub mod residency;
@@ -22,6 +23,7 @@ pub mod view;
 
 pub use controller::FrameRate;
 pub use fineness::{Fineness, Interrupt};
+pub use hybrid::{HybridList, HybridNode};
 pub use magnified::Magnified;
 pub use report::{CutReport, Limit};
 pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};

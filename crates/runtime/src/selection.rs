@@ -1,5 +1,6 @@
 //! The seam between what is resident and what is drawn.
 
+use crate::hybrid::HybridList;
 use crate::residency::{FileId, PageRequest, Residency};
 use crate::splats::SplatList;
 use crate::{CutReport, InstanceId, Interrupt, ModelView, ViewId};
@@ -46,6 +47,8 @@ pub struct DeviceDraw {
 pub enum DrawSource {
     /// A list of splats on the host.
     Splats(SplatList),
+    /// Nodes of a hybrid hierarchy, with their pages on the host.
+    Hybrid(HybridList),
     /// A list that already lies on the device.
     OnDevice(DeviceDraw),
 }
@@ -72,6 +75,7 @@ impl Selection {
     pub fn bytes(&self) -> u64 {
         let list = match &self.draw {
             DrawSource::Splats(list) => list.bytes(),
+            DrawSource::Hybrid(list) => list.bytes(),
             DrawSource::OnDevice(_) => 0,
         };
         list + (self.requests.capacity() * size_of::<PageRequest>()) as u64
@@ -84,7 +88,7 @@ impl Selection {
         }
         match &mut self.draw {
             DrawSource::Splats(list) => list,
-            DrawSource::OnDevice(_) => unreachable!("replaced above"),
+            DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => unreachable!("replaced above"),
         }
     }
 }

@@ -160,7 +160,7 @@ impl Scene {
     pub fn area_px(&self, view: ViewId, camera: &Camera) -> f64 {
         let area_px = |(instance, selection): (&Instance, &Selection)| match &selection.draw {
             DrawSource::Splats(list) => list.area_px(&ModelView::new(camera, &instance.placement)),
-            DrawSource::OnDevice(_) => 0.0,
+            DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => 0.0,
         };
         self.draws(view).map(area_px).sum()
     }

@@ -132,7 +132,7 @@ impl Selector for SplatSelector {
     fn select(&mut self, target: Target, input: &SelectInput<'_>, out: &mut Selection) -> Outcome {
         let mut list = match std::mem::take(&mut out.draw) {
             DrawSource::Splats(list) => list,
-            DrawSource::OnDevice(_) => SplatList::default(),
+            DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => SplatList::default(),
         };
         out.requests.clear();
         let visited = self.visited.entry(target).or_default();
