@@ -109,6 +109,9 @@ impl Residency {
             ModelFile::Hybrid(_) => Table::hybrid(file.pages()),
         };
         self.files.push(FilePages { file, table });
+        // As many as may be listed: what a budget leaves for pages must not shrink when they are.
+        self.idle.clear();
+        self.idle.reserve(self.files.iter().map(|pages| pages.table.len()).sum());
         FileId(self.files.len() as u32 - 1)
     }
 
