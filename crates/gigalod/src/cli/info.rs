@@ -34,8 +34,8 @@ struct InfoReport<'a> {
 
 pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliError> {
     // The skeleton tells nothing here, but where it is damaged the file is no good.
-    let splats = files::open_splats(&args.file)?;
-    let container = splats.container();
+    let model = files::open_built(&args.file)?;
+    let container = model.container();
     let metadata = container.read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
     let bytes = container.store().len();
     let json = InfoReport {
