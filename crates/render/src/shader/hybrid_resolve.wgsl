@@ -96,9 +96,10 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     let looks = array(page_word(node.normals_at + corners.x), page_word(node.normals_at + corners.y), page_word(node.normals_at + corners.z));
     let normal = normal_of(looks[0].x, per_step) * shares.x + normal_of(looks[1].x, per_step) * shares.y
         + normal_of(looks[2].x, per_step) * shares.z;
+    let turned = select(normal, -normal, is_triangle && is_back(node, corners, normal));
     let model_x = bitcast<vec3f>(look.xyz);
     let model_y = bitcast<vec3f>(turn.xyz);
-    let in_world = model_x * normal.x + model_y * normal.y + cross3(model_x, model_y) * normal.z;
+    let in_world = model_x * turned.x + model_y * turned.y + cross3(model_x, model_y) * turned.z;
     var albedo = linear_of(turn.w);
     if has_colors && (turn.w >> 24u) != 0u {
         albedo = linear_of(looks[0].y) * shares.x + linear_of(looks[1].y) * shares.y + linear_of(looks[2].y) * shares.z;
@@ -111,6 +112,16 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     out.depth_bits = bitcast<u32>(z);
     out.depth_test = frame.near * (1.0 / z);
     return out;
+}
+
+// True where a normal points to the side of a triangle that is not seen; the model's axes.
+fn is_back(node: Node, corners: vec3u, normal: vec3f) -> bool {
+    let first = vec3i(position_of(node, corners.x));
+    let to_b = vec3f(vec3i(position_of(node, corners.y)) - first);
+    let to_c = vec3f(vec3i(position_of(node, corners.z)) - first);
+    let across = cross3(to_b, to_c);
+    let seen_from = -(vec3f(node.offset + first) + node.to_eye);
+    return (dot3(across, normal) < 0.0) != (dot3(across, seen_from) < 0.0);
 }
 
 // Where the ray of a pixel meets a triangle's plane, as shares of its corners. Edges are differences of whole steps, so they are

@@ -11,7 +11,7 @@ const LEAST_HALF_PX: f32 = 0.03;
 // Vertices are rounded by up to this on the screen, in pixels.
 const ROUNDING_PX: f32 = 0.003;
 // How far behind its edge a line lies, in half widths.
-const BEHIND: f32 = 0.5;
+const BEHIND: f32 = 0.25;
 
 struct Spot {
     // Pixels it may show in, as of `window_of`.
