@@ -2,6 +2,7 @@
 //!
 //! Goes in: what a frame needs of each. What always holds: nothing is taken here; [`crate::memory::fit`] does that for all of them.
 
+use crate::hybrid::keyed::HybridBuffers;
 use crate::light::LightParams;
 use crate::memory::Pool;
 use crate::readback;
@@ -14,6 +15,7 @@ use gigalod_geom::ImageSize;
 pub(crate) struct Buffers {
     pub(crate) chunks: Vec<Chunk>,
     pub(crate) keyed: KeyedBuffers,
+    pub(crate) hybrid: HybridBuffers,
     pub(crate) passes: Pool,
     pub(crate) parts: Pool,
     pub(crate) light: Pool,
@@ -26,6 +28,7 @@ impl Buffers {
         Self {
             chunks: Vec::new(),
             keyed: KeyedBuffers::new(),
+            hybrid: HybridBuffers::new(),
             passes: Pool::new("passes", Usage::UNIFORM | Usage::COPY_SRC),
             parts: Pool::new("parts", Usage::UNIFORM | Usage::STORAGE),
             light: Pool::new("light", Usage::UNIFORM),
@@ -75,18 +78,22 @@ impl Buffers {
 
     fn all(&self) -> impl Iterator<Item = &Pool> {
         let KeyedBuffers { keys, found, sums, list, draw } = &self.keyed;
+        let HybridBuffers { pages, nodes, runs, passes } = &self.hybrid;
         let chunks = self.chunks.iter().flat_map(|chunk| [&chunk.balls, &chunk.normal_colors]);
         [keys, found, sums, list, draw, &self.passes, &self.parts, &self.light, &self.readback]
             .into_iter()
+            .chain([pages, nodes, runs, passes])
             .chain(chunks)
     }
 
     /// Each of them.
     pub(crate) fn all_mut(&mut self) -> Vec<&mut Pool> {
         let KeyedBuffers { keys, found, sums, list, draw } = &mut self.keyed;
+        let HybridBuffers { pages, nodes, runs, passes } = &mut self.hybrid;
         let chunks = self.chunks.iter_mut().flat_map(|chunk| [&mut chunk.balls, &mut chunk.normal_colors]);
         [keys, found, sums, list, draw, &mut self.passes, &mut self.parts, &mut self.light, &mut self.readback]
             .into_iter()
+            .chain([pages, nodes, runs, passes])
             .chain(chunks)
             .collect()
     }

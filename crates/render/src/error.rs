@@ -34,6 +34,9 @@ pub enum RenderError {
     /// More splats than 32-bit numbers can name.
     #[error("{0} splats in a frame, expected fewer than 4294967295")]
     TooMany(u64),
+    /// Triangles are drawn through storage buffers, and this device cannot write any.
+    #[error("the graphics device cannot draw hybrid models: it has no storage buffers to write to")]
+    NeedsStorage,
     /// The kernel cannot be drawn by the depth test alone, and this device can do no more.
     #[error("the graphics device cannot blend splats: it has no storage buffers to write to")]
     CannotBlend,

@@ -10,8 +10,10 @@
 mod buffers;
 mod commands;
 mod error;
+mod frame;
 mod gbuffer;
 mod gpu;
+mod hybrid;
 mod light;
 mod memory;
 mod readback;
@@ -26,8 +28,9 @@ mod targets;
 pub mod window;
 
 pub use error::RenderError;
+pub use frame::{Frame, Look};
 pub use gpu::{Gpu, GpuLevel};
 pub use light::Lighting;
-pub use renderer::{Frame, Look, Renderer};
+pub use renderer::Renderer;
 pub use splats::Kernel;
 pub use targets::Picture;

@@ -6,6 +6,10 @@
 
 use crate::buffers::Buffers;
 use crate::commands::Commands;
+use crate::frame::{Frame, Lists};
+use crate::hybrid;
+use crate::hybrid::arena::{self, Arena};
+use crate::hybrid::keyed::{HybridBuffers, HybridFrame, HybridPass};
 use crate::light::LightPass;
 use crate::splats::Kernel;
 use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
@@ -15,29 +19,10 @@ use crate::splats::pipelines::{Resolving, Round};
 use crate::splats::store::{self, Plan};
 use crate::staging::Staging;
 use crate::targets::Targets;
-use crate::{Gpu, GpuLevel, Lighting, Picture, RenderError, gbuffer, memory};
-use gigalod_geom::{Camera, ImageSize};
-use gigalod_runtime::{DrawSource, Interrupt, ModelView, Similarity, SplatList};
-
-/// How things are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Look {
-    /// Shape of splats.
-    pub kernel: Kernel,
-    /// Light and background.
-    pub lighting: Lighting,
-}
-
-/// What a frame draws, from where.
-#[derive(Clone, Debug)]
-pub struct Frame<'a> {
-    /// World space.
-    pub camera: Camera,
-    /// How it looks.
-    pub look: Look,
-    /// What each instance draws, and where it stands.
-    pub draws: Vec<(Similarity, &'a DrawSource)>,
-}
+use crate::{Gpu, GpuLevel, Picture, RenderError, gbuffer, memory};
+use gigalod_format::hybrid::NodeRecord;
+use gigalod_geom::ImageSize;
+use gigalod_runtime::Interrupt;
 
 /// Draws frames; keeps pipelines, targets and buffers between them.
 #[derive(Debug)]
@@ -45,9 +30,12 @@ pub struct Renderer {
     gpu: Gpu,
     keyed_pass: KeyedPass,
     depth_test_pass: DepthTestPass,
+    hybrid_pass: HybridPass,
+    arena: Arena,
     light_pass: LightPass,
     budget: Option<u64>,
     compute_extent_px: u32,
+    hybrid_extent_px: u32,
     targets: Option<Targets>,
     staging: Staging,
     uploaded_bytes: u64,
@@ -63,6 +51,8 @@ struct OnDevice {
     resolving: Resolving,
     bands: Bands,
     plan: Plan,
+    hybrid: hybrid::plan::Plan,
+    hybrid_bands: Bands,
 }
 
 /// Parts that [`Renderer::most_splats`] leaves room for.
@@ -77,14 +67,18 @@ impl Renderer {
         let light_pass = LightPass::new(&gpu.device);
         let staging = Staging::new(&gpu);
         let compute_extent_px = keyed::compute_extent_px(&gpu);
+        let hybrid_extent_px = hybrid::keyed::compute_extent_px(&gpu);
         gpu.check()?;
         Ok(Self {
             gpu,
             keyed_pass: KeyedPass::default(),
             depth_test_pass: DepthTestPass::default(),
+            hybrid_pass: HybridPass::default(),
+            arena: Arena::default(),
             light_pass,
             budget: None,
             compute_extent_px,
+            hybrid_extent_px,
             targets: None,
             staging,
             uploaded_bytes: 0,
@@ -119,7 +113,7 @@ impl Renderer {
     pub fn most_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
         const NAMES: u64 = u32::MAX as u64 - 1;
         let Some(budget) = self.budget else { return NAMES };
-        let room = budget.saturating_sub(self.bytes_without_splats(size, kernel));
+        let room = budget.saturating_sub(self.bytes_without_primitives(size, kernel));
         // Whole rows of textures, and the smallest slices; the list has room for one slice.
         let listed = if self.gpu.level() > GpuLevel::WebGl { store::WIDTH * keyed::LISTED_BYTES } else { 0 };
         let row = store::ROW_BYTES + (STRIDE * store::WIDTH).div_ceil(keyed::LEAST_IN_SLICE);
@@ -131,10 +125,11 @@ impl Renderer {
         (rows * store::WIDTH).min(NAMES)
     }
 
-    /// Splats of at most this many pixels across and down are drawn by the compute pass, larger ones through the pipeline: 0 for
-    /// none, 60 is the most. That decides how long a frame takes, never what it shows.
+    /// Splats of at most this many pixels across and down are drawn by the compute pass, larger ones through the pipeline, and nodes'
+    /// triangles by one invocation or by many: 0 for none, 60 is the most. That decides how long a frame takes, never what it shows.
     pub fn set_compute_extent(&mut self, extent_px: u32) {
         self.compute_extent_px = extent_px.min(keyed::MOST_COMPUTE_EXTENT_PX);
+        self.hybrid_extent_px = self.compute_extent_px;
     }
 
     /// Opens the device anew and forgets the old one: what to do about [`RenderError::DeviceLost`]. The next frame fills the new
@@ -153,15 +148,16 @@ impl Renderer {
     /// As for [`Renderer::new`]; then it still has the old one.
     pub fn move_to(&mut self, gpu: Gpu) -> Result<(), RenderError> {
         let fresh = Self::new(gpu)?;
-        *self = Self { budget: self.budget, compute_extent_px: self.compute_extent_px, ..fresh };
+        let (compute_extent_px, hybrid_extent_px) = (self.compute_extent_px, self.hybrid_extent_px);
+        *self = Self { budget: self.budget, compute_extent_px, hybrid_extent_px, ..fresh };
         Ok(())
     }
 
     /// Draws a frame and waits until the device is done. The picture stays there.
     ///
     /// # Errors
-    /// [`RenderError::Size`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`], [`RenderError::TooMany`] and
-    /// [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
+    /// [`RenderError::Size`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`], [`RenderError::NeedsStorage`],
+    /// [`RenderError::TooMany`] and [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
     /// [`RenderError::DeviceLost`]: [`Renderer::recover`].
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), RenderError> {
         self.submit(frame, false, None)?;
@@ -222,23 +218,7 @@ impl Renderer {
         interrupt: Option<&Interrupt>,
     ) -> Result<bool, RenderError> {
         self.gpu.check()?;
-        let (size, kernel) = (frame.camera.size, frame.look.kernel);
-        let limit = self.gpu.max_picture_edge();
-        if size.width.min(size.height) == 0 || size.width.max(size.height) > limit {
-            return Err(RenderError::Size { width: size.width, height: size.height, limit });
-        }
-        if self.gpu.level() == GpuLevel::WebGl && kernel.is_gauss() {
-            return Err(RenderError::CannotBlend);
-        }
-        let lists = frame.draws.iter().map(|(placement, source)| match source {
-            DrawSource::Splats(splats) => Ok((*placement, splats)),
-            _ => Err(RenderError::ForeignDrawSource),
-        });
-        let lists = lists.collect::<Result<Vec<_>, _>>()?;
-        let splats = lists.iter().map(|(_, list)| list.len() as u64).sum::<u64>();
-        if splats >= u64::from(u32::MAX) {
-            return Err(RenderError::TooMany(splats));
-        }
+        let lists = Lists::of(&self.gpu, frame)?;
         self.last = None;
         let sent = self.send(frame, &lists, read_back, interrupt);
         let drawn = sent.and_then(|sent| if sent { self.submit_last(interrupt) } else { Ok(false) });
@@ -249,15 +229,14 @@ impl Renderer {
     fn send(
         &mut self,
         frame: &Frame<'_>,
-        lists: &[(Similarity, &SplatList)],
+        lists: &Lists<'_>,
         read_back: bool,
         interrupt: Option<&Interrupt>,
     ) -> Result<bool, RenderError> {
         let (camera, kernel) = (&frame.camera, frame.look.kernel);
         let most = store::most_in_chunk(&self.gpu);
-        let splats = lists.iter().map(|(_, list)| list.len() as u64).sum();
-        let area_px = lists.iter().map(|(placement, list)| list.area_px(&ModelView::new(camera, placement))).sum();
-        let plan = Plan::new(camera, lists, most, keyed::most_in_slice(splats, area_px));
+        let area_px = lists.splat_area_px(camera);
+        let plan = Plan::new(camera, &lists.splats, most, keyed::most_in_slice(lists.splat_count(), area_px));
         let bands = self.bands(camera.size, kernel);
         let keyed = self.gpu.level() > GpuLevel::WebGl;
         let passes = if keyed {
@@ -265,36 +244,55 @@ impl Renderer {
         } else {
             depth_test::pass_bytes(camera)
         };
-        self.make_room(camera.size, kernel, &plan, passes.len() as u64, read_back)?;
-        let Self { gpu, staging, buffers, uploaded_bytes, .. } = self;
-        if !store::upload(gpu, staging, &buffers.chunks, most, lists, interrupt)? {
+        self.buffers.want(passes.len() as u64, &plan);
+        if keyed {
+            self.buffers.keyed.want(&bands, kernel, plan.largest_chunk());
+        }
+        let hybrid_bands = self.bands(camera.size, Kernel::Round);
+        let hybrid = hybrid::plan::Plan::new(camera, &lists.hybrid, hybrid::plan::most_runs(&self.gpu))?;
+        let hybrid_passes = hybrid::keyed::pass_bytes(&self.gpu, camera, &hybrid_bands, &hybrid, self.hybrid_extent_px);
+        let pages = arena::needed_bytes(lists.hybrid.iter().map(|(_, list)| *list));
+        if hybrid.nodes > 0 {
+            let Buffers { keyed, hybrid: buffers, .. } = &mut self.buffers;
+            buffers.want(keyed, &self.gpu, &hybrid_bands, &hybrid, hybrid_passes.len() as u64)?;
+        }
+        self.make_room(camera.size, pages, read_back)?;
+        let Self { gpu, staging, buffers, arena, uploaded_bytes, .. } = self;
+        if !store::upload(gpu, staging, &buffers.chunks, most, &lists.splats, interrupt)?
+            || !arena.place(gpu, staging, &buffers.hybrid.pages, &lists.hybrid, interrupt)?
+        {
             return Ok(false);
         }
         staging.write(gpu, buffers.passes.buffer(), 0, &passes)?;
         staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&plan.parts))?;
+        if hybrid.nodes > 0 {
+            let nodes = hybrid::plan::Plan::node_params(camera, &lists.hybrid, arena);
+            buffers.hybrid.send(gpu, staging, &nodes, &hybrid.runs, &hybrid_passes)?;
+        }
         let light = LightPass::params(camera, &frame.look.lighting);
         staging.write(gpu, buffers.light.buffer(), 0, bytemuck::bytes_of(&light))?;
         staging.finish(gpu)?;
         *uploaded_bytes = staging.take_written_bytes();
         let rounds = keyed::rounds(gpu, camera.size, kernel, area_px);
         let resolving = Resolving { is_shared: plan.is_shared(), footprint: read_back };
-        self.last = Some(OnDevice { kernel, rounds, resolving, bands, plan });
+        self.last = Some(OnDevice { kernel, rounds, resolving, bands, plan, hybrid, hybrid_bands });
         Ok(true)
     }
 
     /// Draws what lies on the device. False where that was broken off.
     fn submit_last(&mut self, interrupt: Option<&Interrupt>) -> Result<bool, RenderError> {
-        let Self { gpu, buffers, targets, .. } = self;
-        let OnDevice { kernel, rounds, resolving, bands, plan } = self.last.as_ref().expect("just sent, or asked for");
+        let Self { gpu, buffers: whole, targets, .. } = self;
+        let OnDevice { kernel, rounds, resolving, bands, plan, hybrid, hybrid_bands } =
+            self.last.as_ref().expect("just sent, or asked for");
         let Targets { gbuffer, picture } = targets.as_ref().expect("made with the room");
         let mut commands = Commands::new(gpu, interrupt);
-        let chunks = &buffers.chunks[..plan.chunks.len()];
-        let (kernel, resolving, passes, parts) = (*kernel, *resolving, &buffers.passes, &buffers.parts);
+        let chunks = &whole.chunks[..plan.chunks.len()];
+        let (kernel, resolving, passes, parts) = (*kernel, *resolving, &whole.passes, &whole.parts);
         if chunks.is_empty() {
             drop(gbuffer.begin(commands.encoder(), true));
         } else if gpu.level() > GpuLevel::WebGl {
             self.keyed_pass.prepare(gpu, kernel, resolving);
-            let (bands, buffers) = (*bands, &buffers.keyed);
+            let (bands, buffers) = (*bands, &whole.keyed);
             let keyed = KeyedFrame { kernel, rounds, resolving, bands, plan, chunks, passes, parts, buffers };
             if !self.keyed_pass.encode(gpu, &mut commands, gbuffer, &keyed)? {
                 return Ok(false);
@@ -304,7 +302,15 @@ impl Renderer {
             let splats = DepthTestFrame { kernel, plan, chunks, passes, parts };
             self.depth_test_pass.encode(gpu, commands.encoder(), gbuffer, &splats);
         }
-        let lit = self.light_pass.bind(&gpu.device, gbuffer, &buffers.light);
+        if hybrid.nodes > 0 {
+            self.hybrid_pass.prepare(gpu, hybrid);
+            let Buffers { keyed: shared, hybrid: buffers, .. } = &*whole;
+            let frame = HybridFrame { bands: *hybrid_bands, plan: hybrid, buffers, shared };
+            if !self.hybrid_pass.encode(gpu, &mut commands, gbuffer, &frame)? {
+                return Ok(false);
+            }
+        }
+        let lit = self.light_pass.bind(&gpu.device, gbuffer, &whole.light);
         {
             let target = gbuffer::view(picture);
             let mut pass = commands.encoder().begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -324,8 +330,29 @@ impl Renderer {
         Bands::new(size, kernel, self.gpu.most_buffer_bytes().min(share))
     }
 
-    /// What a frame without a splat takes.
-    fn bytes_without_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
+    /// Bytes of hybrid pages that can be drawn into a picture of this size within the budget, and read back; [`Renderer::page_bytes`]
+    /// says what a node's page takes. 0 where there is no room for the picture itself.
+    pub fn most_page_bytes(&self, size: ImageSize, kernel: Kernel) -> u64 {
+        let most = hybrid::keyed::most_page_bytes(&self.gpu);
+        let Some(budget) = self.budget else { return most };
+        let taken = self.bytes_without_primitives(size, kernel) + HybridBuffers::usual_bytes(&self.gpu);
+        // Whole rows of a texture.
+        (budget.saturating_sub(taken) / arena::ROW_BYTES * arena::ROW_BYTES).min(most)
+    }
+
+    /// How many triangles, points and lines that is, of usual models: half as many vertices as triangles.
+    pub fn most_primitives(&self, size: ImageSize, kernel: Kernel) -> u64 {
+        const USUAL_BYTES: u64 = 16;
+        self.most_page_bytes(size, kernel) / USUAL_BYTES
+    }
+
+    /// Bytes that the page of a hybrid node takes on the device.
+    pub fn page_bytes(record: &NodeRecord) -> u64 {
+        arena::page_bytes(record)
+    }
+
+    /// What a frame without a splat or a node takes.
+    fn bytes_without_primitives(&self, size: ImageSize, kernel: Kernel) -> u64 {
         let mut buffers = Buffers::new();
         let bands = self.bands(size, kernel);
         if self.gpu.level() > GpuLevel::WebGl {
@@ -336,21 +363,9 @@ impl Renderer {
         Staging::BYTES + Targets::bytes(size) + buffers.least_bytes()
     }
 
-    /// Targets of this size, and buffers for a frame; within the budget, or with an error and nothing changed.
-    fn make_room(
-        &mut self,
-        size: ImageSize,
-        kernel: Kernel,
-        plan: &Plan,
-        pass_bytes: u64,
-        read_back: bool,
-    ) -> Result<(), RenderError> {
-        let bands = self.bands(size, kernel);
-        let keyed = self.gpu.level() > GpuLevel::WebGl;
-        self.buffers.want(pass_bytes, plan);
-        if keyed {
-            self.buffers.keyed.want(&bands, kernel, plan.largest_chunk());
-        }
+    /// Targets of this size, and buffers for a frame, of which all is wanted but the pages of nodes; within the budget, or with an
+    /// error and nothing changed.
+    fn make_room(&mut self, size: ImageSize, page_bytes: u64, read_back: bool) -> Result<(), RenderError> {
         if read_back {
             self.buffers.want_readback(size);
         }
@@ -359,7 +374,16 @@ impl Renderer {
         if let Some(targets) = stale {
             targets.free();
         }
-        memory::fit(&self.gpu, &mut self.buffers.all_mut(), other, self.budget)?;
+        // With room for what is drawn later, then without.
+        let mut fitted = Ok(());
+        for wanted in arena::wishes(&self.gpu, page_bytes, self.buffers.hybrid.pages.bytes()) {
+            self.buffers.hybrid.pages.wanted = wanted;
+            fitted = memory::fit(&self.gpu, &mut self.buffers.all_mut(), other, self.budget);
+            if !matches!(fitted, Err(RenderError::Budget { .. })) {
+                break;
+            }
+        }
+        fitted?;
         if self.targets.is_none() {
             self.targets = Some(Targets::new(&self.gpu, size));
             self.gpu.check()?;

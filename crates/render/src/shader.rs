@@ -2,9 +2,17 @@
 //! stands for one of several files: where a pass delivers what it draws.
 
 /// Sources that others import, by name.
-const SHARED: [(&str, &str); 12] = [
+const SHARED: [(&str, &str); 20] = [
     ("dot.wgsl", include_str!("shader/dot.wgsl")),
+    ("hybrid_kinds.wgsl", include_str!("shader/hybrid_kinds.wgsl")),
+    ("hybrid_params.wgsl", include_str!("shader/hybrid_params.wgsl")),
+    ("hybrid_place.wgsl", include_str!("shader/hybrid_place.wgsl")),
+    ("hybrid_spots.wgsl", include_str!("shader/hybrid_spots.wgsl")),
+    ("hybrid_store.wgsl", include_str!("shader/hybrid_store.wgsl")),
+    ("hybrid_target.wgsl", include_str!("shader/hybrid_target.wgsl")),
+    ("hybrid_triangle.wgsl", include_str!("shader/hybrid_triangle.wgsl")),
     ("light_params.wgsl", include_str!("shader/light_params.wgsl")),
+    ("nearness.wgsl", include_str!("shader/nearness.wgsl")),
     ("splat_keys_32.wgsl", include_str!("shader/splat_keys_32.wgsl")),
     ("splat_keys_64.wgsl", include_str!("shader/splat_keys_64.wgsl")),
     ("splat_keys_64_found.wgsl", include_str!("shader/splat_keys_64_found.wgsl")),
@@ -105,10 +113,12 @@ pub(crate) mod tests {
         let wide = Capabilities::SHADER_INT64 | Capabilities::SHADER_INT64_ATOMIC_MIN_MAX;
         let baseline = Capabilities::empty();
         let light = [("light", crate::light::SOURCE, Target::None, baseline)];
-        let splats = crate::splats::sources().map(|(name, source, target)| {
+        let needed = |(name, source, target)| {
             (name, source, target, if matches!(target, Target::Keys64 | Target::Keys64Found) { wide } else { baseline })
-        });
-        for (name, source, target, capabilities) in light.into_iter().chain(splats) {
+        };
+        let splats = crate::splats::sources().map(needed);
+        let hybrid = crate::hybrid::sources().map(needed);
+        for (name, source, target, capabilities) in light.into_iter().chain(splats).chain(hybrid) {
             let text = resolve(source, target);
             let module =
                 wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(&text)));

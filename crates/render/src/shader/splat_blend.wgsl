@@ -15,6 +15,7 @@
 
 #import dot.wgsl
 #import splat_shape.wgsl
+#import nearness.wgsl
 #import splat_nearness.wgsl
 #import splat_surface.wgsl
 

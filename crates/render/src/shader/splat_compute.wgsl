@@ -26,6 +26,7 @@ var<private> part: PartParams;
 #import splat_store.wgsl
 #import dot.wgsl
 #import splat_shape.wgsl
+#import nearness.wgsl
 #import splat_nearness.wgsl
 #import splat_target.wgsl
 

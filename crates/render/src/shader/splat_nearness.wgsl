@@ -1,5 +1,4 @@
-// Depths as whole numbers: the nearer, the larger; 0 stands for nothing at all. Depths are positive, so their bits are ordered
-// as they are, and the highest bit is free.
+// A splat as passes deliver it; how near it is says nearness.wgsl.
 
 struct Splat {
     shape: Shape,
@@ -8,14 +7,6 @@ struct Splat {
     // Linear light, and world space, turned towards the eye: only where `blends()`.
     albedo: vec3f,
     normal: vec3f,
-}
-
-fn nearness_of(z: f32) -> u32 {
-    return 0x7fffffffu - bitcast<u32>(z);
-}
-
-fn depth_of(nearness: u32) -> f32 {
-    return bitcast<f32>(0x7fffffffu - (nearness & 0x7fffffffu));
 }
 
 // True where what a splat looks like is needed while it is drawn, not after.

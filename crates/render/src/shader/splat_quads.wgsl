@@ -14,6 +14,7 @@
 #import splat_store.wgsl
 #import dot.wgsl
 #import splat_shape.wgsl
+#import nearness.wgsl
 #import splat_nearness.wgsl
 #import splat_target.wgsl
 #import splat_parts.wgsl

@@ -23,6 +23,7 @@ override wants_footprint: bool = true;
 #import splat_store.wgsl
 #import dot.wgsl
 #import splat_shape.wgsl
+#import nearness.wgsl
 #import splat_nearness.wgsl
 #import splat_parts.wgsl
 #import splat_surface.wgsl

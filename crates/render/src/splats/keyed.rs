@@ -81,7 +81,17 @@ impl Bands {
         [keys, if kernel.is_gauss() { pixels * SUMS_BYTES } else { 0 }]
     }
 
-    fn rows_of(&self, band: u32) -> Range<u32> {
+    /// Width, and most rows in one.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        [self.width, self.rows]
+    }
+
+    /// How many.
+    pub(crate) fn count(&self) -> u32 {
+        self.count
+    }
+
+    pub(crate) fn rows_of(&self, band: u32) -> Range<u32> {
         band * self.rows..((band + 1) * self.rows).min(self.height)
     }
 }
@@ -119,7 +129,7 @@ impl KeyedBuffers {
     }
 
     /// Copies the keys of a band, whole rows of the texture, to where they are read.
-    fn find(&self, encoder: &mut wgpu::CommandEncoder, keys_bytes: u64) {
+    pub(crate) fn find(&self, encoder: &mut wgpu::CommandEncoder, keys_bytes: u64) {
         let rows = (keys_bytes / KEYS_ROW_BYTES) as u32;
         let layout =
             wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(KEYS_ROW_BYTES as u32), rows_per_image: None };

@@ -293,7 +293,7 @@ pub(crate) const fn packed_material() -> u16 {
 }
 
 /// Colours that differ from one level to the next and still tell coarse from fine.
-pub(crate) fn level_color(level: u32) -> u16 {
+pub fn level_color(level: u32) -> u16 {
     const CIRCLE: [[u8; 3]; 12] = [
         [230, 60, 50],
         [235, 130, 40],

@@ -1,0 +1,36 @@
+// A triangle on the screen, in whole steps: shared by the passes that draw triangles, so that they agree to the last bit.
+//
+// A pixel belongs to it where its centre lies inside, or on a left or top edge. Depth is 1 / z interpolated, which is exact for
+// a plane, by weights that whole numbers give: so it lies between the depths of the corners, however thin a triangle is.
+
+struct Flat {
+    // Clockwise as seen: the second and third corner may have changed places.
+    a: vec2i,
+    b: vec2i,
+    c: vec2i,
+    // 1 / z of the first, and what the others have more.
+    per_z: vec3f,
+}
+
+// Turns it so that its area is positive.
+fn flat_of(a: Vertex, b: Vertex, c: Vertex, is_turned: bool) -> Flat {
+    var out: Flat;
+    out.a = a.at;
+    out.b = select(b.at, c.at, is_turned);
+    out.c = select(c.at, b.at, is_turned);
+    let of_b = select(b.per_z, c.per_z, is_turned);
+    let of_c = select(c.per_z, b.per_z, is_turned);
+    out.per_z = vec3f(a.per_z, of_b - a.per_z, of_c - a.per_z);
+    return out;
+}
+
+// True where what lies exactly on this edge of a triangle belongs to it.
+fn owns(edge: vec2i) -> bool {
+    return edge.y < 0i || (edge.y == 0i && edge.x > 0i);
+}
+
+// `of_b` and `of_c`: twice the areas across from these corners, and `per_area` the inverse of that of the triangle.
+fn depth_in(flat: Flat, of_b: f32, of_c: f32, per_area: f32) -> f32 {
+    let per_z = flat.per_z.x + (of_b * per_area) * flat.per_z.y + (of_c * per_area) * flat.per_z.z;
+    return 1.0 / per_z;
+}
