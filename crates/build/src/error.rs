@@ -14,6 +14,9 @@ pub enum BuildError {
     /// Nothing to show.
     #[error("no triangles and no points, expected at least one")]
     Nothing,
+    /// Points have no surface.
+    #[error("no triangles, expected at least one; points become splats")]
+    NoTriangles,
     /// Local space is `f32`.
     #[error("the model is {extent:e} units wide, expected at most 1e30")]
     TooWide {

@@ -1,6 +1,6 @@
 //! Builders: a model stream goes in, a complete `.glod` file comes out, or an error and no file at all.
 //!
-//! One module for each representation; [`splats::build`] is the first. What always holds: the bytes depend on the input and
+//! One module for each representation: [`splats::build`], [`hybrid::build`]. What always holds: the bytes depend on the input and
 //! the options alone, not on threads, machines or the clock; nothing appears under the output's name until it is complete.
 #![forbid(unsafe_code)]
 
@@ -10,6 +10,7 @@ mod input;
 mod journal;
 mod output;
 mod progress;
+mod site;
 pub mod splats;
 mod spool;
 mod unfinished;
@@ -37,6 +38,12 @@ pub struct Options {
     /// Triangles whose bounding circle is larger than this, in model units, are diced into samples that far apart. `None`: what
     /// suits the model, as [`splats`] says.
     pub spacing: Option<f64>,
+    /// Of hybrid models, `--res`: a node's error is at most the edge of its cell divided by this. `None`: [`hybrid::RESOLUTION`].
+    pub resolution: Option<u32>,
+    /// Of hybrid models, `--tmax`: most triangles of a leaf. `None`: [`hybrid::MOST_TRIANGLES`].
+    pub most_triangles: Option<u32>,
+    /// Of hybrid models, `--appearance`: whether errors of shading and colour are bounded too, or geometry alone.
+    pub keeps_looks: bool,
     /// What a length of 1 is; overrides what the input says. Coordinates stay as they are.
     pub unit: Option<LengthUnit>,
     /// What is built. Where it is given, a build that does not fit into memory can be continued by another process: what it
@@ -60,6 +67,9 @@ impl Default for Options {
             threads: 0,
             up: None,
             spacing: None,
+            resolution: None,
+            most_triangles: None,
+            keeps_looks: true,
             unit: None,
             input: None,
             side: SideLog::default(),

@@ -13,6 +13,7 @@ use super::{Shape, weld, zip};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A triangle with all that belongs to it.
 #[repr(C)]
@@ -40,9 +41,27 @@ pub(super) struct Raised {
     pub(super) nodes: Vec<Made>,
 }
 
+/// Is told how many pieces are in leaves.
+pub(super) struct Told<'a> {
+    done: AtomicU64,
+    tell: &'a (dyn Fn(u64) + Sync),
+}
+
+impl<'a> Told<'a> {
+    pub(super) fn new(tell: &'a (dyn Fn(u64) + Sync)) -> Self {
+        Self { done: AtomicU64::new(0), tell }
+    }
+
+    fn add(&self, pieces: usize) {
+        let pieces = pieces as u64;
+        (self.tell)(self.done.fetch_add(pieces, Ordering::Relaxed) + pieces);
+    }
+}
+
 /// Raises a cell.
-pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape) -> Raised {
+pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape, told: &Told<'_>) -> Raised {
     if pieces.len() <= shape.most_triangles || cell.level == MOST_LEVEL {
+        told.add(pieces.len());
         return leaf(&pieces, cell, shape);
     }
     let sets = split(&pieces, cell, shape);
@@ -51,7 +70,7 @@ pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape) -> Raised {
         .into_par_iter()
         .enumerate()
         .filter(|(_, pieces)| !pieces.is_empty())
-        .map(|(octant, pieces)| raise(pieces, cell.child(octant as u8), shape))
+        .map(|(octant, pieces)| raise(pieces, cell.child(octant as u8), shape, told))
         .collect();
     join(children, cell, shape)
 }

@@ -4,10 +4,12 @@
 //! point of either; points that correspond are no farther apart than the `geo` of the face that they lie in. What the patch stands
 //! for is the original, not the level below: errors are carried along with the faces.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 /// A corner that faces share.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct Vertex {
     /// Local space: model space less the origin of the root's cell.
     pub(crate) at: DVec3,
@@ -18,7 +20,8 @@ pub(crate) struct Vertex {
 }
 
 /// A triangle, and how far it may be off.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(crate) struct Face {
     /// Numbers of vertices, counter-clockwise seen from outside.
     pub(crate) corners: [u32; 3],

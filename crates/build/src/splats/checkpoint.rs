@@ -7,7 +7,7 @@ use super::chunk::Head;
 use super::divide::{Chunks, Division};
 use super::kept::KeptTree;
 use super::leaves::Leaf;
-use super::mesh::{Mesh, Positions};
+use super::mesh::Mesh;
 use super::paint::Paint;
 use super::points::{Cells, Fits};
 use super::tree::Extent;
@@ -141,10 +141,6 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
     let facts = || Facts::of_json(&journal.state).ok_or_else(odd);
     let stage = match journal.phase.as_str() {
         "read" => Stage::Read(Mesh {
-            positions: Positions::reopen(work)?,
-            normals: Spool::reopen(work, "normals")?,
-            colors: Spool::reopen(work, "colors")?,
-            triangles: Spool::reopen(work, "triangles")?,
             paint: match &journal.state {
                 Value::Null => None,
                 state => Some(Paint {
@@ -156,6 +152,7 @@ pub(super) fn load(work: Option<&Work>) -> io::Result<(Stage, Option<String>)> {
                     materials: Spool::reopen(work, "materials")?,
                 }),
             },
+            ..Mesh::reopen(work)?
         }),
         CELLS | FITTING | FITTED => {
             let state = &journal.state["cells"];

@@ -19,18 +19,18 @@ use std::io;
 /// What a vertex gathers from its triangles.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct Gathered {
+pub(crate) struct Gathered {
     /// [`UNREFERENCED`] until a triangle that is not diced has come.
-    pub(super) radius: f32,
+    pub(crate) radius: f32,
     /// In steps of 2⁻¹⁶: integers, so that the order of the triangles does not matter.
-    pub(super) normal: [i32; 3],
+    pub(crate) normal: [i32; 3],
 }
 
 /// Radius of what no triangle has come to yet.
 const UNREFERENCED: f32 = -1.0;
 
 /// A triangle's normal in steps of 1/32767; zero where it has no area.
-pub(super) type FaceNormal = [i16; 3];
+pub(crate) type FaceNormal = [i16; 3];
 
 /// Rounded to the nearest: without `round`, which is a call where the processor is not known to have it.
 fn steps_of(value: f32) -> i16 {
@@ -38,7 +38,7 @@ fn steps_of(value: f32) -> i16 {
 }
 
 /// Triangles that add up their volumes one after the other; batches hold whole strides, so that the sum does not depend on them.
-pub(super) const STRIDE: usize = 4096;
+pub(crate) const STRIDE: usize = 4096;
 
 /// A batch of triangles, measured; nothing of it is gathered yet.
 #[derive(Default)]
@@ -104,15 +104,15 @@ impl Measured {
 }
 
 /// What a look at all triangles gives.
-pub(super) struct Gathering {
-    pub(super) gathered: Spool<Gathered>,
-    pub(super) faces: Spool<FaceNormal>,
-    pub(super) orientation: Orientation,
+pub(crate) struct Gathering {
+    pub(crate) gathered: Spool<Gathered>,
+    pub(crate) faces: Spool<FaceNormal>,
+    pub(crate) orientation: Orientation,
     /// Of all triangles, until it is known what is diced.
-    pub(super) sizes: Sizes,
+    pub(crate) sizes: Sizes,
 }
 
-pub(super) fn gather(
+pub(crate) fn gather(
     mesh: &Mesh,
     diced: Option<Dicing>,
     plan: &MemoryPlan<'_>,
@@ -161,18 +161,18 @@ fn gather_from<C: Corner>(
 }
 
 /// What vertices have gathered, as a whole.
-pub(super) struct Survey {
+pub(crate) struct Survey {
     /// Of all that are referenced.
-    pub(super) bounds: Aabb,
+    pub(crate) bounds: Aabb,
     /// Share of them that lie inside a smooth surface: triangles all around, in about one direction.
-    pub(super) smooth_share: f64,
+    pub(crate) smooth_share: f64,
 }
 
 /// Sum of the normals of triangles around a vertex, weighted by their angles in radians, from which on it is inside a smooth surface:
 /// of a flat one, the sum is a full turn; at the corner of a house, less than half of one.
 const SMOOTH: f32 = 0.75 * std::f32::consts::TAU * 65_536.0;
 
-pub(super) fn survey(mesh: &Mesh, gathered: &Spool<Gathered>) -> io::Result<Survey> {
+pub(crate) fn survey(mesh: &Mesh, gathered: &Spool<Gathered>) -> io::Result<Survey> {
     let mut bounds = Aabb::EMPTY;
     let (mut smooth, mut all) = (0u64, 0u64);
     let mut at = Vec::new();
@@ -190,7 +190,7 @@ pub(super) fn survey(mesh: &Mesh, gathered: &Spool<Gathered>) -> io::Result<Surv
 }
 
 /// All triangles, as many at a time as the plan allows, in whole strides.
-pub(super) fn for_each_batch(
+pub(crate) fn for_each_batch(
     triangles: &Spool<[u32; 3]>,
     plan: &MemoryPlan<'_>,
     mut visit: impl FnMut(u64, &[[u32; 3]]) -> io::Result<()>,

@@ -12,19 +12,19 @@ use std::io;
 
 /// The corners of a batch of triangles, in order of their vertices.
 #[derive(Default)]
-pub(super) struct Corners {
+pub(crate) struct Corners {
     /// Vertex in the upper half, number of the corner (3 · triangle + 0, 1, 2) in the lower. Sorted; empty while not needed.
     by_vertex: Vec<u64>,
     vertices: Vec<u32>,
 }
 
 impl Corners {
-    pub(super) fn of(triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn of(triangles: &[[u32; 3]]) -> Self {
         Self::of_vertices(triangles.as_flattened().to_vec())
     }
 
     /// Of anything that has vertices.
-    pub(super) fn of_vertices(vertices: Vec<u32>) -> Self {
+    pub(crate) fn of_vertices(vertices: Vec<u32>) -> Self {
         Self { by_vertex: Vec::new(), vertices }
     }
 
@@ -37,7 +37,7 @@ impl Corners {
     }
 
     /// The record of each corner's vertex.
-    pub(super) fn fetch<R: Pod + Send + Sync>(&mut self, records: &Spool<R>, out: &mut Vec<R>) -> io::Result<()> {
+    pub(crate) fn fetch<R: Pod + Send + Sync>(&mut self, records: &Spool<R>, out: &mut Vec<R>) -> io::Result<()> {
         out.clear();
         if let Spool::Memory(all) = records {
             self.vertices.par_iter().with_min_len(1 << 14).map(|vertex| all[*vertex as usize]).collect_into_vec(out);
@@ -57,7 +57,7 @@ impl Corners {
     }
 
     /// Folds a contribution of each corner into the record of its vertex; `fold` is told the number of the corner.
-    pub(super) fn fold<R: Pod>(
+    pub(crate) fn fold<R: Pod>(
         &mut self,
         records: &mut Spool<R>,
         mut fold: impl FnMut(&mut R, usize),

@@ -13,7 +13,7 @@ use glam::{DVec3, Vec3};
 use std::io;
 
 /// The position of a vertex, in either precision.
-pub(super) trait Corner: Copy + Pod + Send + Sync {
+pub(crate) trait Corner: Copy + Pod + Send + Sync {
     /// The vector from another one to this one.
     fn minus(&self, other: &Self) -> [f32; 3];
 
@@ -42,7 +42,7 @@ impl Corner for [f64; 3] {
 
 /// Model space. As narrow as the model is: half the bytes that have to be fetched again and again.
 #[derive(Debug)]
-pub(super) enum Positions {
+pub(crate) enum Positions {
     /// All coordinates are `f32`s.
     Narrow(Spool<[f32; 3]>),
     Wide(Spool<[f64; 3]>),
@@ -54,7 +54,7 @@ const WIDE: &str = "wide_positions";
 
 impl Positions {
     /// Puts all on disk; returns the name, too.
-    pub(super) fn secure(&self) -> io::Result<(String, Extent)> {
+    pub(crate) fn secure(&self) -> io::Result<(String, Extent)> {
         match self {
             Self::Narrow(spool) => spool.secure(),
             Self::Wide(spool) => spool.secure(),
@@ -62,7 +62,7 @@ impl Positions {
     }
 
     /// As an earlier process left them.
-    pub(super) fn reopen(work: &Work) -> io::Result<Self> {
+    pub(crate) fn reopen(work: &Work) -> io::Result<Self> {
         if work.has(WIDE) {
             Ok(Self::Wide(Spool::reopen(work, WIDE)?))
         } else {
@@ -70,7 +70,7 @@ impl Positions {
         }
     }
 
-    pub(super) fn len(&self) -> u64 {
+    pub(crate) fn len(&self) -> u64 {
         match self {
             Self::Narrow(spool) => spool.len(),
             Self::Wide(spool) => spool.len(),
@@ -104,7 +104,7 @@ impl Positions {
     }
 
     /// Positions of the vertices from `start` on.
-    pub(super) fn read_vec(&self, start: u64, count: usize, out: &mut Vec<DVec3>) -> io::Result<()> {
+    pub(crate) fn read_vec(&self, start: u64, count: usize, out: &mut Vec<DVec3>) -> io::Result<()> {
         fn read<C: Corner>(spool: &Spool<C>, start: u64, count: usize, out: &mut Vec<DVec3>) -> io::Result<()> {
             let mut corners = Vec::new();
             spool.read_vec(start, count, &mut corners)?;
@@ -120,27 +120,38 @@ impl Positions {
 }
 
 /// An indexed mesh as it was read; without triangles it is a point cloud.
-pub(super) struct Mesh {
-    pub(super) positions: Positions,
+pub(crate) struct Mesh {
+    pub(crate) positions: Positions,
     /// One for each vertex, or empty.
-    pub(super) normals: Spool<[f32; 3]>,
+    pub(crate) normals: Spool<[f32; 3]>,
     /// 8-bit sRGB, one for each vertex, or empty.
-    pub(super) colors: Spool<[u8; 3]>,
-    pub(super) triangles: Spool<[u32; 3]>,
+    pub(crate) colors: Spool<[u8; 3]>,
+    pub(crate) triangles: Spool<[u32; 3]>,
     /// Where materials or textures have colours.
-    pub(super) paint: Option<Paint>,
+    pub(crate) paint: Option<Paint>,
 }
 
 impl Mesh {
+    /// As an earlier process left it, but for what materials need.
+    pub(crate) fn reopen(work: &Work) -> io::Result<Self> {
+        Ok(Self {
+            positions: Positions::reopen(work)?,
+            normals: Spool::reopen(work, "normals")?,
+            colors: Spool::reopen(work, "colors")?,
+            triangles: Spool::reopen(work, "triangles")?,
+            paint: None,
+        })
+    }
+
     /// Bytes of the spools, but for pictures.
-    pub(super) fn spooled_bytes(&self) -> u64 {
+    pub(crate) fn spooled_bytes(&self) -> u64 {
         let per_vertex = 24 * self.positions.len() + 12 * self.normals.len() + 3 * self.colors.len();
         let of_paint = |paint: &Paint| 8 * paint.tex_coords.len() + 16 * paint.corners.len();
         per_vertex + 12 * self.triangles.len() + self.paint.as_ref().map_or(0, of_paint)
     }
 }
 
-pub(super) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phases<'_>) -> Result<Mesh, BuildError> {
+pub(crate) fn read(input: &mut dyn ModelStream, plan: &MemoryPlan, phases: &Phases<'_>) -> Result<Mesh, BuildError> {
     phases.begin("read", input.bytes_consumed().1);
     let place = plan.place();
     let mut mesh = Mesh {

@@ -22,45 +22,39 @@ mod below;
 mod checkpoint;
 mod chunk;
 mod contract;
-mod dice;
+pub(crate) mod dice;
 mod divide;
 mod facets;
 mod family;
-mod gather;
-mod join;
+pub(crate) mod gather;
+pub(crate) mod join;
 mod kept;
 mod layout;
 mod leaves;
 mod lone;
 mod lower;
 mod measure;
-mod mesh;
+pub(crate) mod mesh;
 mod orientation;
 mod pages;
-mod paint;
-mod plan;
+pub(crate) mod paint;
+pub(crate) mod plan;
 mod points;
 mod quantise;
 mod reorder;
 mod tree;
 
-use crate::journal::Header;
-use crate::output::{Output, behind_links, expect_no_folder, folder_of};
+use crate::output::folder_of;
 use crate::progress::{Phases, Progress, Report};
-use crate::spool::Place;
-use crate::work::Work;
+use crate::site::{GENERATOR, Site};
 use crate::{BuildError, Options};
 use checkpoint::{Facts, Stage};
 use divide::Division;
 use gigalod_format::splats::{Root, Skeleton};
-use gigalod_format::{Bounds, InputCounts, Kind, Metadata, ReferenceSystem};
+use gigalod_format::{Bounds, InputCounts, Kind, Metadata};
 use gigalod_import::ModelStream;
 use plan::MemoryPlan;
-use std::collections::BTreeMap;
 use std::path::Path;
-
-/// In files and in journals.
-const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"));
 
 /// Builds `out` from a mesh, or, where there are no triangles, from a point cloud.
 ///
@@ -72,43 +66,13 @@ pub fn build(
     progress: &dyn Progress,
     out: &Path,
 ) -> Result<Report, BuildError> {
-    expect_no_folder(out).map_err(BuildError::Output)?;
-    let out = &*behind_links(out);
     let phases = Phases::new(progress);
-    let workers = rayon::ThreadPoolBuilder::new()
-        .num_threads(plan::threads(options))
-        .build()
-        .map_err(|error| BuildError::Threads(error.to_string()))?;
-
-    let up = options.up.unwrap_or(input.up_axis());
-    let unit = options.unit.or(input.unit());
-    let mut influential =
-        BTreeMap::from([("as".into(), Kind::Splats.name().into()), ("up".into(), format!("{up:?}").to_lowercase())]);
-    influential.extend(unit.map(|unit| ("units".into(), unit.symbol().into())));
-    let reference_system = input.reference_system().map(|system| ReferenceSystem {
-        name: system.name.clone(),
-        epsg: system.epsg,
-        wkt: system.wkt.clone(),
-    });
-    if let Some(spacing) = options.spacing {
-        influential.insert("spacing".into(), spacing.to_string());
-    }
+    let own = options.spacing.map(|spacing| ("spacing".to_string(), spacing.to_string()));
     let in_memory = plan::fits_into_memory(options, &*input);
-    let work = match &options.input {
-        Some(identity) => {
-            let program = GENERATOR.into();
-            let header = Header { program, input: identity.clone(), options: influential.clone() };
-            Work::open(out, header, options.side.clone(), options.resume, !in_memory, |text| progress.note(text))?
-        }
-        None => None,
-    };
-    let (output, place) = match &work {
-        Some(work) => (Output::create_in(work, out), Place::Work(work)),
-        None if in_memory => (Output::create(out), Place::Memory),
-        None => (Output::create(out), Place::Folder(folder_of(out))),
-    };
-    let output = output.map_err(BuildError::Output)?;
-    let plan = MemoryPlan::new(options, place, folder_of(out));
+    let kind = (Kind::Splats, own.into_iter().collect());
+    let site = Site::open(&*input, options, kind, (plan::threads(options), in_memory), progress, out)?;
+    let plan = MemoryPlan::new(options, site.place(), folder_of(&site.out));
+    let (workers, up, work) = (&site.workers, site.up, &site.work);
 
     let mut input = Some(input);
     let (mut stage, resumed_after) = checkpoint::load(work.as_ref()).map_err(BuildError::Scratch)?;
@@ -123,7 +87,7 @@ pub fn build(
                 Stage::Cells(facts, cells, points::Fits::new(&plan).map_err(BuildError::Scratch)?)
             }
             Stage::Cells(facts, cells, fits) => {
-                let save = |fits: &points::Fits| match &work {
+                let save = |fits: &points::Fits| match work {
                     Some(work) => checkpoint::save_fits(work, &facts, &cells, fits),
                     None => Ok(()),
                 };
@@ -142,7 +106,7 @@ pub fn build(
                 Stage::Dividing(facts, Division::new(leaves, &plan).map_err(BuildError::Scratch)?)
             }
             Stage::Dividing(facts, division) => {
-                let save = |division: &Division| match &work {
+                let save = |division: &Division| match work {
                     Some(work) => checkpoint::save_division(work, &facts, division),
                     None => Ok(()),
                 };
@@ -151,7 +115,7 @@ pub fn build(
             }
             Stage::Tree(facts, chunks) => break (facts, chunks),
         };
-        if let Some(work) = &work {
+        if let Some(work) = work {
             checkpoint::save(work, &stage).map_err(BuildError::Scratch)?;
         }
     };
@@ -159,7 +123,7 @@ pub fn build(
     let Facts { counts, origin, bounds, closed, has_colors, dicing } = facts;
     let quantised = workers.install(|| quantise::top_down(chunks, &plan, &phases)).map_err(BuildError::Scratch)?;
     let pages::Written { writer, pages, model, nodes, levels, raw_bytes } =
-        workers.install(|| pages::write(&quantised, output.file(), &phases)).map_err(BuildError::Output)?;
+        workers.install(|| pages::write(&quantised, site.output.file(), &phases)).map_err(BuildError::Output)?;
     let root = Root {
         origin,
         sphere: quantised.root,
@@ -176,6 +140,7 @@ pub fn build(
     if has_colors {
         attributes.push("colors".into());
     }
+    let mut influential = site.influential.clone();
     if let Some(dicing) = dicing {
         influential.insert("spacing".into(), dicing.spacing.to_string());
     }
@@ -191,17 +156,13 @@ pub fn build(
         raw_bytes: raw_bytes + skeleton.len() as u64,
         closed,
         bounds: Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() },
-        reference_system,
+        reference_system: site.reference_system.clone(),
         attributes,
         dicing,
         per_level: levels,
     };
     let (buffer, output_bytes) = writer.finish(&skeleton, &metadata).map_err(BuildError::Output)?;
-    drop(buffer);
-    output.publish().map_err(BuildError::Output)?;
-    drop(quantised);
-    if let Some(work) = work {
-        work.done();
-    }
+    drop((buffer, quantised));
+    site.finish()?;
     Ok(Report { metadata, output_bytes, phases: phases.times(), resumed_after })
 }

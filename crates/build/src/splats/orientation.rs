@@ -6,7 +6,7 @@
 
 /// Collects triangles, anywhere in any order; ask [`Orientation::is_closed`] at the end.
 #[derive(Default)]
-pub(super) struct Orientation {
+pub(crate) struct Orientation {
     balance: u64,
     six_volumes: f64,
     /// Sum of the absolute volumes.
@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-5;
 impl Orientation {
     /// Adds a triangle by its vertex numbers, and six times the volume of the tetrahedron that it makes with a fixed point near the
     /// mesh.
-    pub(super) fn add(&mut self, [a, b, c]: [u32; 3], six_volumes: f32) {
+    pub(crate) fn add(&mut self, [a, b, c]: [u32; 3], six_volumes: f32) {
         for (from, to) in [(a, b), (b, c), (c, a)] {
             let weight = mix(u64::from(from.min(to)) << 32 | u64::from(from.max(to)));
             // A degenerate triangle's edge from a vertex to itself is its own opposite.
@@ -31,13 +31,13 @@ impl Orientation {
     }
 
     /// Adds what another has collected.
-    pub(super) fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         self.balance = self.balance.wrapping_add(other.balance);
         self.six_volumes += other.six_volumes;
         self.volumes += other.volumes;
     }
 
-    pub(super) fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         self.balance == 0 && self.six_volumes > self.volumes * ROUNDING
     }
 }

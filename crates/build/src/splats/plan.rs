@@ -37,7 +37,7 @@ const WORK_PER_LEAF: u64 = 160;
 const WORK_PER_THREAD: u64 = 13 << 20;
 
 #[derive(Debug)]
-pub(super) struct MemoryPlan<'a> {
+pub(crate) struct MemoryPlan<'a> {
     budget: u64,
     threads: usize,
     place: Place<'a>,
@@ -48,7 +48,7 @@ pub(super) struct MemoryPlan<'a> {
 }
 
 /// Threads to work with: as many as are asked for, or one a core, but no more than memory has room for.
-pub(super) fn threads(options: &Options) -> usize {
+pub(crate) fn threads(options: &Options) -> usize {
     let asked = match options.threads {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         threads => threads,
@@ -57,7 +57,7 @@ pub(super) fn threads(options: &Options) -> usize {
 }
 
 /// Decides by what the stream declares; a stream that declares nothing is spooled to files.
-pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bool {
+pub(crate) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bool {
     let spooled = match (input.declared_vertices(), input.declared_faces()) {
         (Some(vertices), Some(faces)) => {
             let is_painted = input.materials().iter().any(|material| material.texture.is_some());
@@ -72,17 +72,17 @@ pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bo
 }
 
 impl<'a> MemoryPlan<'a> {
-    pub(super) fn new(options: &Options, place: Place<'a>, folder: &'a Path) -> Self {
+    pub(crate) fn new(options: &Options, place: Place<'a>, folder: &'a Path) -> Self {
         let (budget, threads) = (options.memory_bytes, threads(options));
         Self { budget, threads, place, folder, is_spilled: AtomicBool::new(false) }
     }
 
-    pub(super) fn place(&self) -> Place<'a> {
+    pub(crate) fn place(&self) -> Place<'a> {
         if self.is_spilled.load(Ordering::Relaxed) { self.place_in_files() } else { self.place }
     }
 
     /// For what lies in files whatever room there is.
-    pub(super) fn place_in_files(&self) -> Place<'a> {
+    pub(crate) fn place_in_files(&self) -> Place<'a> {
         match self.place {
             Place::Memory => Place::Folder(self.folder),
             other => other,
@@ -90,58 +90,63 @@ impl<'a> MemoryPlan<'a> {
     }
 
     /// True where all spools are in memory.
-    pub(super) fn is_in_memory(&self) -> bool {
+    pub(crate) fn is_in_memory(&self) -> bool {
         matches!(self.place(), Place::Memory)
     }
 
     /// So many leaves are to come, of which the input said nothing: from now on spools are in files, if there are too many.
     /// `spooled` is what is in memory beside them.
-    pub(super) fn expect_leaves(&self, leaves: u64, spooled: u64) {
+    pub(crate) fn expect_leaves(&self, leaves: u64, spooled: u64) {
         if leaves.saturating_mul(SPOOLED_PER_VERTEX).saturating_add(spooled) > self.budget / 2 {
             self.is_spilled.store(true, Ordering::Relaxed);
         }
     }
 
+    /// Bytes for what is worked on.
+    pub(crate) fn half(&self) -> u64 {
+        self.budget / 2
+    }
+
     /// Most bytes to decode a picture in.
-    pub(super) fn picture_bytes(&self) -> u64 {
+    pub(crate) fn picture_bytes(&self) -> u64 {
         self.budget / 2
     }
 
     /// Bytes for tiles of pictures.
-    pub(super) fn tile_bytes(&self) -> u64 {
+    pub(crate) fn tile_bytes(&self) -> u64 {
         self.budget / 16
     }
 
     /// Triangles to be diced at a time.
-    pub(super) fn diced_at_once(&self) -> usize {
+    pub(crate) fn diced_at_once(&self) -> usize {
         ((self.budget / 8 / WORK_PER_DICED) as usize).clamp(256, 1 << 16)
     }
 
     /// Cells of them to be made into leaves at a time.
-    pub(super) fn cells_at_once(&self) -> usize {
+    pub(crate) fn cells_at_once(&self) -> usize {
         self.threads << 14
     }
 
     /// Vertices that memory has room for.
-    pub(super) fn most_vertices(&self) -> u64 {
+    pub(crate) fn most_vertices(&self) -> u64 {
         self.budget / 2 / SPOOLED_PER_VERTEX
     }
 
     /// Triangles that memory has room for.
-    pub(super) fn most_triangles(&self) -> u64 {
+    pub(crate) fn most_triangles(&self) -> u64 {
         self.budget / 2 / SPOOLED_PER_TRIANGLE
     }
 
     /// Triangles to be joined with their vertices at a time.
-    pub(super) fn triangles_at_once(&self) -> usize {
+    pub(crate) fn triangles_at_once(&self) -> usize {
         (self.budget / 2 / WORK_PER_TRIANGLE) as usize
     }
 
     /// Leaves to be made into trees at a time; never less than a chunk, which the smallest budget has room for.
-    pub(super) fn leaves_at_once(&self) -> usize {
+    pub(crate) fn leaves_at_once(&self) -> usize {
         ((self.budget / 2 / WORK_PER_LEAF) as usize).max(MAX_LEAVES)
     }
 
     /// Records of a piece that is read from a spool.
-    pub(super) const PIECE: usize = 1 << 16;
+    pub(crate) const PIECE: usize = 1 << 16;
 }

@@ -53,9 +53,6 @@ pub(crate) struct BuildArgs {
     /// File to write; replaced if it exists
     #[arg(short, long, value_name = "OUT.glod")]
     pub(crate) output: PathBuf,
-    /// Representation
-    #[arg(long = "as", value_enum, default_value_t = Representation::Auto)]
-    pub(crate) representation: Representation,
     /// Which way is up [default: as the format has it]
     #[arg(long, value_enum)]
     pub(crate) up: Option<UpAxisArg>,
@@ -67,7 +64,7 @@ pub(crate) struct BuildArgs {
     /// Continue a build that was interrupted, if there is one
     ///
     /// A build that does not fit into half of --memory works in a folder beside the output, .NAME.glod.build, and can go on
-    /// there after anything: with the same input, --as, --up, --units and --spacing, or it is refused; --memory and --threads may differ. Without
+    /// there after anything: with the same input and options, or it is refused; --memory and --threads may differ. Without
     /// --resume what is there is removed and the build starts anew. The folder takes up to three times the input's size.
     #[arg(long)]
     pub(crate) resume: bool,
@@ -77,6 +74,20 @@ pub(crate) struct BuildArgs {
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct BuildOptions {
+    /// Representation
+    #[arg(long = "as", value_enum, default_value_t = Representation::Auto)]
+    pub(crate) representation: Representation,
+    /// Hybrid: the error of a node is at most the edge of its cell divided by this, 8 to 1024 [default: 64]
+    ///
+    /// Larger draws fewer primitives from afar, and takes more room on disk.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(8..=1024), value_name = "R")]
+    pub(crate) res: Option<u32>,
+    /// Hybrid: most triangles of a leaf, 64 to 65536 [default: 4096]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(64..=65_536), value_name = "N")]
+    pub(crate) tmax: Option<u32>,
+    /// Hybrid: bound errors of shading and colour too, or of geometry alone, which takes half the room
+    #[arg(long, value_enum, default_value_t = Appearance::On)]
+    pub(crate) appearance: Appearance,
     /// Most memory to use, as 512MiB or 4GB; at least 64MiB
     #[arg(long, default_value = "2GiB", value_parser = parse::memory, value_name = "SIZE")]
     pub(crate) memory: u64,
@@ -94,10 +105,58 @@ pub(crate) struct BuildOptions {
 
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Representation {
-    /// What suits the input best: at present always splats
+    /// What suits the input best: hybrid for meshes without materials, else splats
     Auto,
     /// A hierarchy of bounding spheres, drawn as points
     Splats,
+    /// An octree of simplified triangles and points, with proven errors
+    Hybrid,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Appearance {
+    On,
+    Off,
+}
+
+impl BuildOptions {
+    /// Within this much memory, all else as it is by default.
+    pub(crate) fn within(memory: u64) -> Self {
+        Self {
+            representation: Representation::Auto,
+            res: None,
+            tmax: None,
+            appearance: Appearance::On,
+            memory,
+            threads: 0,
+            spacing: None,
+        }
+    }
+
+    /// What the bytes of a result depend on, in a line; empty where all is as it is by default.
+    pub(crate) fn recipe(&self) -> String {
+        let mut recipe = String::new();
+        if self.representation != Representation::Auto {
+            recipe += &format!("as {:?}\n", self.representation).to_lowercase();
+        }
+        let numbers = [("res", self.res.map(f64::from)), ("tmax", self.tmax.map(f64::from)), ("spacing", self.spacing)];
+        for (name, value) in numbers {
+            if let Some(value) = value {
+                recipe += &format!("{name} {value}\n");
+            }
+        }
+        if self.appearance == Appearance::Off {
+            recipe += "appearance off\n";
+        }
+        recipe
+    }
+
+    /// The same as arguments of `gigalod build`.
+    pub(crate) fn recipe_arguments(&self) -> Vec<String> {
+        let recipe = self.recipe();
+        let option = |line: &str| line.split_once(' ').map(|(name, value)| [format!("--{name}"), value.to_string()]);
+        recipe.lines().filter_map(option).flatten().collect()
+    }
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! `gigalod build`.
 
-use super::args::{BuildArgs, BuildOptions, UpAxisArg};
+use super::args::{Appearance, BuildArgs, BuildOptions, Representation, UpAxisArg};
 use super::cache;
 use super::error::{CliError, Outcome};
 use super::files;
@@ -9,8 +9,9 @@ use super::parse::readable_bytes;
 use super::progress::Console;
 use super::usage::Usage;
 use gigalod_build::{BuildError, Options, Report, SideLog};
-use gigalod_format::InputCounts;
+use gigalod_format::{InputCounts, Kind};
 use gigalod_geom::camera::UpAxis;
+use gigalod_import::ModelStream;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         console.warn(&CliError::in_file(inputs.name(), what));
     }
     let json = BuildReport {
-        kind: "splats",
+        kind: metadata.options.get("as").map_or("splats", String::as_str),
         input: metadata.input,
         options: &metadata.options,
         nodes: metadata.nodes,
@@ -79,17 +80,20 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         Some(dicing) => format!(" (of {} diced triangles {})", dicing.triangles, dicing.samples),
         None => String::new(),
     };
+    let (what, unit, count) = match json.kind {
+        "hybrid" => (format!("{} nodes", metadata.nodes), "triangle", metadata.input.triangles),
+        _ => (format!("{} splats", metadata.leaves), "leaf", metadata.leaves),
+    };
     let text = format!(
-        "{}: {} as {} splats{diced} on {} levels, {} ({:.2} bytes a leaf), in {seconds:.1} s\n",
+        "{}: {} as {what}{diced} on {} levels, {} ({:.2} bytes a {unit}), in {seconds:.1} s\n",
         args.output.display(),
         match metadata.input {
             InputCounts { points, triangles: 0, .. } => format!("{points} points"),
             InputCounts { triangles, .. } => format!("{triangles} triangles"),
         },
-        metadata.leaves,
         metadata.levels,
         readable_bytes(report.output_bytes),
-        report.output_bytes as f64 / metadata.leaves as f64,
+        report.output_bytes as f64 / count as f64,
     );
     Ok(Outcome::new(&json, text))
 }
@@ -128,18 +132,31 @@ pub(crate) fn build(
 ) -> Result<Report, CliError> {
     let side = SideLog::default();
     let (stream, identity) = inputs.open(sense, &side, console)?;
+    let representation = match options.representation {
+        Representation::Splats => Kind::Splats,
+        Representation::Hybrid => Kind::Hybrid,
+        Representation::Auto if suits_hybrid(&*stream) => Kind::Hybrid,
+        Representation::Auto => Kind::Splats,
+    };
     let options = Options {
         memory_bytes: options.memory,
         threads: options.threads,
         up: sense.up,
         unit: sense.unit,
         spacing: options.spacing,
+        resolution: options.res,
+        most_triangles: options.tmax,
+        keeps_looks: options.appearance == Appearance::On,
         input: (recovery != Recovery::Lost).then_some(identity),
         side: side.clone(),
         resume: recovery == Recovery::Resume,
     };
     let work = console.work(&inputs.name().file_name().unwrap_or_default().to_string_lossy());
-    let built = gigalod_build::splats::build(stream, &options, &work, output).map_err(|error| {
+    let builder = match representation {
+        Kind::Hybrid => gigalod_build::hybrid::build,
+        _ => gigalod_build::splats::build,
+    };
+    let built = builder(stream, &options, &work, output).map_err(|error| {
         let is_ours = !matches!(error, BuildError::Busy { .. } | BuildError::OtherBuild { .. });
         let error = CliError::build(inputs.name(), output, &error);
         let stays = is_ours && recovery != Recovery::Lost && gigalod_build::can_continue(output);
@@ -148,6 +165,11 @@ pub(crate) fn build(
     warn_of_libraries(&side, console);
     cache::remember(inputs, output, &side)?;
     Ok(built)
+}
+
+/// A mesh whose colours, if any, are its vertices'. What materials say of triangles, splats sample.
+fn suits_hybrid(stream: &dyn ModelStream) -> bool {
+    stream.declared_faces() != Some(0) && stream.materials().is_empty()
 }
 
 /// Pictures that are missing were told of when they were asked for; a missing library of materials changes only looks, too.

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub(crate) fn container_of(file: &Path, options: &BuildOptions, console: &Console) -> Result<PathBuf, CliError> {
     let work = console.work(&file.file_name().unwrap_or_default().to_string_lossy());
     let mut has_begun = false;
-    let found = find(file, options.spacing, &mut |done, total| {
+    let found = find(file, options, &mut |done, total| {
         if !std::mem::replace(&mut has_begun, true) {
             work.begin("read", total);
         }
@@ -51,13 +51,13 @@ pub(crate) enum Found {
     NotBuilt(PathBuf),
 }
 
-/// Looks a file up that would be built with this spacing; `at` is told how many bytes of how many were read, and says whether to go on.
-pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<Found, CliError> {
+/// Looks a file up that would be built with these options; `at` is told how many bytes of how many were read, and says whether to go on.
+pub(crate) fn find(file: &Path, options: &BuildOptions, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<Found, CliError> {
     if files::is_container(file)? {
         return Ok(Found::Itself);
     }
     let folder = folder()?;
-    let cached = folder.join(format!("{}.glod", key(file, spacing, at)?));
+    let cached = folder.join(format!("{}.glod", key(file, options, at)?));
     if cached.is_file() && files::open_built(&cached).is_ok() && names_the_same(file, &list_of(&cached)) {
         return Ok(Found::Built(cached));
     }
@@ -149,16 +149,14 @@ fn folder() -> Result<PathBuf, CliError> {
     })
 }
 
-/// Depends on all bytes of the file, the spacing asked for and the program's version; memory and threads do not change what is built.
-fn key(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<String, CliError> {
+/// Depends on all bytes of the file, the options that count and the program's version; memory and threads do not change what is built.
+fn key(file: &Path, options: &BuildOptions, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<String, CliError> {
     let wrong = |error| CliError::in_file(file, error);
     let mut source = files::open(file)?;
     let total = source.metadata().map_err(wrong)?.len();
     let mut hasher = blake3::Hasher::new();
-    hasher.update(concat!("gigalod ", env!("CARGO_PKG_VERSION"), " splats\n").as_bytes());
-    if let Some(spacing) = spacing {
-        hasher.update(format!("spacing {spacing}\n").as_bytes());
-    }
+    hasher.update(concat!("gigalod ", env!("CARGO_PKG_VERSION"), "\n").as_bytes());
+    hasher.update(options.recipe().as_bytes());
     let mut buffer = vec![0; 1 << 20];
     let mut done = 0;
     loop {

@@ -78,7 +78,7 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliErro
     let _ = writeln!(text, "{}: {} triangles, {}", scan.display(), statue.triangles, readable_bytes(statue.bytes));
 
     let built = folder.join("statue.glod");
-    let build_options = BuildOptions { memory: 2 << 30, threads: 0, spacing: None };
+    let build_options = BuildOptions::within(2 << 30);
     let report = build(&Inputs::one(&scan), &built, &build_options, Sense::default(), Recovery::Lost, console)?;
     let _ = writeln!(text, "{}: {}", built.display(), readable_bytes(report.output_bytes));
 

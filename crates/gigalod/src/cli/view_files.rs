@@ -91,7 +91,7 @@ impl Files {
             work.at("looked up", Some(done as f32 / total.max(1) as f32), None);
             !work.is_cancelled()
         };
-        let (container, original) = match cache::find(path, self.build.spacing, &mut at)? {
+        let (container, original) = match cache::find(path, &self.build, &mut at)? {
             Found::Itself => (path.to_owned(), None),
             Found::Built(cached) => (cached, Some(path.to_owned())),
             Found::NotBuilt(cached) => {
@@ -142,7 +142,7 @@ impl Files {
         let mut child = Command::new(std::env::current_exe().map_err(wrong)?)
             .args(["build", "--verbose", "--resume"])
             .args(["--memory", &self.build.memory.to_string(), "--threads", &self.build.threads.to_string()])
-            .args(self.build.spacing.iter().flat_map(|spacing| ["--spacing".to_string(), spacing.to_string()]))
+            .args(self.build.recipe_arguments())
             .arg("--output")
             .arg(output)
             .arg(input_name)

@@ -5,16 +5,16 @@
 
 /// What is to be cut, and how finely.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in super::super) struct Dicing {
+pub(crate) struct Dicing {
     /// Cells are no larger than squares of this size; model units.
-    pub(in super::super) spacing: f64,
+    pub(crate) spacing: f64,
     /// Triangles with a larger bounding radius are cut.
-    pub(in super::super) threshold: f64,
+    pub(crate) threshold: f64,
 }
 
 impl Dicing {
     /// Says so of a triangle by its bounding radius.
-    pub(in super::super) fn is_diced(&self, radius: f32) -> bool {
+    pub(crate) fn is_diced(&self, radius: f32) -> bool {
         f64::from(radius) > self.threshold
     }
 }
@@ -27,7 +27,7 @@ const AREA_UNIT: f64 = 1.0 / (1 << 20) as f64;
 
 /// Triangles by size.
 #[derive(Clone)]
-pub(in super::super) struct Sizes {
+pub(crate) struct Sizes {
     areas: Vec<u64>,
     counts: Vec<u64>,
     largest: f32,
@@ -53,18 +53,18 @@ const MOST_SAMPLES: u64 = 1 << 21;
 
 /// What is known of a mesh besides sizes.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Kind {
+pub(crate) struct Kind {
     /// Share of the vertices that lie inside a smooth surface.
-    pub(in super::super) smooth_share: f64,
+    pub(crate) smooth_share: f64,
     /// Colours belong to triangles: each is a sample at least.
-    pub(in super::super) is_painted: bool,
+    pub(crate) is_painted: bool,
     /// Texels that are shown.
-    pub(in super::super) texels: u64,
+    pub(crate) texels: u64,
 }
 
 impl Sizes {
     /// Adds a triangle: its bounding radius, and its area as a share of the radius' square.
-    pub(in super::super) fn add(&mut self, radius: f32, area_share: f32) {
+    pub(crate) fn add(&mut self, radius: f32, area_share: f32) {
         self.triangles += 1;
         self.largest = self.largest.max(radius);
         let size = (radius.to_bits() >> SHIFT) as usize;
@@ -77,7 +77,7 @@ impl Sizes {
     }
 
     /// Adds what another has counted.
-    pub(in super::super) fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         for (sum, more) in self.areas.iter_mut().zip(&other.areas).chain(self.counts.iter_mut().zip(&other.counts)) {
             *sum += more;
         }
@@ -86,7 +86,7 @@ impl Sizes {
     }
 
     /// The largest bounding radius.
-    pub(in super::super) fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         f64::from(self.largest)
     }
 
@@ -102,7 +102,7 @@ impl Sizes {
     }
 
     /// About as many samples as a mesh is cut into.
-    pub(in super::super) fn samples(&self, dicing: Dicing) -> f64 {
+    pub(crate) fn samples(&self, dicing: Dicing) -> f64 {
         self.cells(dicing.spacing, dicing.threshold)
     }
 
@@ -139,7 +139,7 @@ impl Sizes {
     /// * **Any other mesh**, such as a building, is sampled evenly with about as many samples as it has triangles, but at least
     ///   2¹⁸, and up to 2²¹ where it has 512 for each triangle or as many texels.
     /// * **A painted mesh** is never left to its vertices, which have no colours: each triangle is a sample at least.
-    pub(in super::super) fn dicing(&self, kind: Kind, asked: Option<f64>) -> Option<Dicing> {
+    pub(crate) fn dicing(&self, kind: Kind, asked: Option<f64>) -> Option<Dicing> {
         let wanted = self.triangles.saturating_mul(SAMPLES_PER_TRIANGLE).max(kind.texels);
         let samples = self.triangles.max(wanted.clamp(LEAST_SAMPLES, MOST_SAMPLES)) as f64;
         let dicing = if let Some(spacing) = asked {

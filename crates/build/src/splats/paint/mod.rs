@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::io;
 
 /// What triangles show.
-pub(super) struct Paint {
+pub(crate) struct Paint {
     /// By the number that triangles have.
     pub(super) looks: Vec<Look>,
     pub(super) pictures: Vec<Picture>,
