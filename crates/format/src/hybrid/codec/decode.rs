@@ -64,14 +64,14 @@ impl Streams {
         }
         let mut bits = BitReader::new(raw);
         let mut rare = vec![0; rare];
-        bits.numbers(&rare_classes, &mut rare, |out, number| *out = number)?;
+        bits.numbers::<2, _>(&rare_classes, &mut rare, |out, number| *out = number)?;
         Some(Self { tokens, rare, keys, shift, classes, bits })
     }
 
     /// Numbers of a stream; the streams' in order.
     fn numbers<T: Clone + Default>(&mut self, stream: usize, of: impl Fn(u32) -> T) -> Option<Vec<T>> {
         let mut out = vec![T::default(); self.classes[stream].len()];
-        self.bits.numbers(&self.classes[stream], &mut out, |out, number| *out = of(number))?;
+        self.bits.numbers::<3, _>(&self.classes[stream], &mut out, |out, number| *out = of(number))?;
         Some(out)
     }
 }
@@ -180,7 +180,7 @@ pub(in super::super) fn decode(bytes: &[u8], model: &Model, record: &NodeRecord,
     let mut streams = Streams::read(bytes, model, record, root)?;
     let mut steps = vec![Vec4::ZERO; vertices];
     for coordinate in 0..3 {
-        streams.bits.numbers(&streams.classes[coordinate], &mut steps, |step, number| {
+        streams.bits.numbers::<3, _>(&streams.classes[coordinate], &mut steps, |step, number| {
             step[coordinate] = unfolded(number) as f32;
         })?;
     }
@@ -218,7 +218,7 @@ fn vertex_normals(page: &mut Page, streams: &mut Streams, known: &[Vec4], bits: 
     let mut differences = vec![[0; 2]; known.len()];
     for coordinate in 0..2 {
         let set = |difference: &mut [u16; 2], number: u32| difference[coordinate] = number as u16;
-        streams.bits.numbers(&streams.classes[3 + coordinate], &mut differences, set)?;
+        streams.bits.numbers::<3, _>(&streams.classes[3 + coordinate], &mut differences, set)?;
     }
     let sums = predict::normals(known, &page.triangles);
     page.normals.reserve_exact(page.positions.len());

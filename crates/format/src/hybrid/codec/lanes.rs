@@ -8,11 +8,11 @@
 //!
 //! Source: Giesen, *Interleaved entropy coders*, arXiv:1402.3392, 2014.
 
-use super::values::{BASES, EXTRA_BITS, SYMBOLS};
+use super::values::{BASES, EXTRA_BITS, MASKS, SYMBOLS};
 use crate::rans::{self, LOW};
 
 /// Lanes of a page. With 4 decoding takes a tenth longer, with 16 as long.
-pub(super) const LANES: usize = 8;
+pub(super) const LANES: usize = 4;
 /// Bits of a probability.
 pub(super) const SCALE_BITS: u32 = 11;
 const SCALE: u32 = 1 << SCALE_BITS;
@@ -170,18 +170,33 @@ impl BitReader {
         Self { bytes: padded, at: 0 }
     }
 
-    /// The numbers that classes and the next bits are, each given to `set`; `None` where bits end.
+    /// The numbers that classes and the next bits are, each given to `set`; `None` where bits end. So many are taken from the bits at a
+    /// time; their classes must not have more than 57 bits together.
     #[inline(always)]
-    pub(super) fn numbers<T>(&mut self, classes: &[u8], out: &mut [T], set: impl Fn(&mut T, u32)) -> Option<()> {
+    pub(super) fn numbers<const TOGETHER: usize, T>(
+        &mut self,
+        classes: &[u8],
+        out: &mut [T],
+        set: impl Fn(&mut T, u32),
+    ) -> Option<()> {
         let mut at = self.at;
-        for (class, out) in classes.iter().zip(out) {
-            let class = usize::from(*class) & (SYMBOLS - 1);
+        let mut some = |classes: &[u8], out: &mut [T]| {
             let chunk: &[u8; 8] = self.bytes.get(at >> 3..)?.first_chunk()?;
-            let bits = u64::from_le_bytes(*chunk) >> (at & 7);
-            let extra = EXTRA_BITS[class];
-            set(out, BASES[class] + (bits as u32 & ((1u32 << extra) - 1)));
-            at += usize::from(extra);
+            let mut bits = u64::from_le_bytes(*chunk) >> (at & 7);
+            for (class, out) in classes.iter().zip(out) {
+                let class = usize::from(*class) & (SYMBOLS - 1);
+                set(out, BASES[class] + (bits as u32 & MASKS[class]));
+                bits >>= EXTRA_BITS[class];
+                at += usize::from(EXTRA_BITS[class]);
+            }
+            Some(())
+        };
+        let (rounds, rest) = classes.as_chunks::<TOGETHER>();
+        let (out_rounds, out_rest) = out.as_chunks_mut::<TOGETHER>();
+        for (classes, out) in rounds.iter().zip(out_rounds) {
+            some(classes, out)?;
         }
+        some(rest, out_rest)?;
         self.at = at;
         Some(())
     }

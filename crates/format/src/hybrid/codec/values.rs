@@ -13,13 +13,14 @@ pub(super) const BASES: [u32; SYMBOLS] = bases();
 /// Raw bits of each.
 pub(super) const EXTRA_BITS: [u8; SYMBOLS] = extra_bits();
 
+/// The lowest so many bits.
+pub(super) const MASKS: [u32; SYMBOLS] = masks();
+
 const fn bases() -> [u32; SYMBOLS] {
     let mut bases = [0; SYMBOLS];
-    let mut class = 0;
+    let mut class = 1;
     while class < SYMBOLS {
-        let above = class as u32 - if class as u32 > SINGLE { SINGLE } else { class as u32 };
-        bases[class] =
-            if class as u32 <= SINGLE { class as u32 } else { (2 + above % 2) << (2 + above / 2) & 0xFFFF_FFFF };
+        bases[class] = bases[class - 1] + (1 << EXTRA_BITS[class - 1]);
         class += 1;
     }
     bases
@@ -30,11 +31,21 @@ const fn extra_bits() -> [u8; SYMBOLS] {
     let mut class = SINGLE as usize;
     while class < SYMBOLS {
         let bits_of_class = 2 + (class as u8 - SINGLE as u8) / 2;
-        // Classes beyond 32 bits are in no alphabet.
-        bits[class] = if bits_of_class > 30 { 30 } else { bits_of_class };
+        // Classes beyond these are in no alphabet.
+        bits[class] = if bits_of_class > 21 { 21 } else { bits_of_class };
         class += 1;
     }
     bits
+}
+
+const fn masks() -> [u32; SYMBOLS] {
+    let mut masks = [0; SYMBOLS];
+    let mut class = 0;
+    while class < SYMBOLS {
+        masks[class] = (1 << EXTRA_BITS[class]) - 1;
+        class += 1;
+    }
+    masks
 }
 
 /// Class of a number.
