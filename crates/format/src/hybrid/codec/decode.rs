@@ -135,6 +135,7 @@ fn weave(weaving: Weaving<'_>) -> Option<()> {
                 *triangles.next()? = front.add(&mut at, next_vertex);
                 next_vertex += 1;
             }
+            front.link(&at);
             if u32::from(added) >= weave::MOST_ADDED {
                 continue;
             }
