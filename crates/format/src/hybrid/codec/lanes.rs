@@ -117,7 +117,7 @@ impl Writer {
                 self.words.push(*state as u16);
                 *state >>= 16;
             }
-            *state = (*state / frequency << SCALE_BITS) + *state % frequency + u32::from(start);
+            *state = ((*state / frequency) << SCALE_BITS) + *state % frequency + u32::from(start);
         }
     }
 

@@ -148,7 +148,7 @@ pub(super) fn wrapped(guess: i32, difference: u32, mask: u32) -> u32 {
 /// Undoes [`wrapped`].
 pub(super) fn difference(code: i32, guess: i32, bits: u32) -> u32 {
     let half = 1 << (bits - 1);
-    folded((code - guess + half & (1 << bits) - 1) - half)
+    folded(((code - guess + half) & ((1 << bits) - 1)) - half)
 }
 
 /// The code that a first normal is compared with.
