@@ -17,7 +17,7 @@ fn number(bytes: &[u8], at: usize, length: usize) -> u64 {
 }
 
 fn unfolded(number: u64) -> i64 {
-    if number % 2 == 0 { (number / 2) as i64 } else { -((number / 2) as i64) - 1 }
+    if number.is_multiple_of(2) { (number / 2) as i64 } else { -((number / 2) as i64) - 1 }
 }
 
 /// Frequencies of all tables.
