@@ -6,3 +6,4 @@ mod made;
 mod round_trip;
 mod sample;
 mod stranger;
+mod stranger_front;
