@@ -1,8 +1,9 @@
 //! Bytes a triangle by part, and triangles decoded a second by one thread:
-//! `cargo run --release -p gigalod-format --example hybrid_speed -- [FILE [CELL_BITS [MOST_TRIANGLES]]]`.
+//! `cargo run --release -p gigalod-format --example hybrid_speed -- [FILE [CELL_BITS [MOST_TRIANGLES [all]]]]`.
 //!
 //! FILE is u32 vertices, u32 triangles, then f32 × 3 a vertex and u32 × 3 a triangle; without it a noisy sphere is made. An octree cuts it
-//! by the triangles' middles into pages. Each page is decoded by itself, the best of 7; prints one JSON object.
+//! by the triangles' middles into pages. With `all`, vertices get colours and every fourth triangle's middle becomes a point besides, on a grid of
+//! 8 steps. Each page is decoded by itself, the best of 7; prints one JSON object.
 
 use gigalod_format::hybrid::{Model, NodeId, NodeRecord, Page, PartBits, Prepared, Root, Skeleton, Statistics};
 use gigalod_geom::Aabb;
@@ -136,6 +137,23 @@ fn cpu_seconds() -> f64 {
     nanoseconds.map_or_else(|| begin.elapsed().as_secs_f64(), |nanoseconds| nanoseconds / 1e9)
 }
 
+/// Colours by place, with noise, and a point for every fourth triangle.
+fn with_colors_and_points(page: &mut Page, extent: [u16; 3]) {
+    for triangle in page.triangles.iter().step_by(4) {
+        let corners = triangle.map(|vertex| page.positions[vertex as usize].map(u32::from));
+        let middle = [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<u32>() / 3);
+        page.positions.push([0, 1, 2].map(|axis| (middle[axis] as u16 & !7).min(extent[axis])));
+        page.normals.push(page.normals[triangle[0] as usize]);
+    }
+    page.colors = (page.positions.iter().enumerate())
+        .map(|(at, position)| {
+            let noise = (at as u32).wrapping_mul(2_654_435_761) >> 30;
+            let [red, green, blue] = position.map(|x| (u32::from(x) / 16 + noise) as u8);
+            [red, green, blue, 255]
+        })
+        .collect();
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let mesh = match arguments.next() {
@@ -144,7 +162,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let cell_bits = arguments.next().map_or(Ok(11), |bits| bits.parse())?;
     let most = arguments.next().map_or(Ok(8000), |most| most.parse())?;
-    let pages = pages(&mesh, cell_bits, most);
+    let mut pages = pages(&mesh, cell_bits, most);
+    let is_all = arguments.next().is_some();
+    if is_all {
+        pages.iter_mut().for_each(|(page, _, extent)| with_colors_and_points(page, *extent));
+    }
     let prepared: Vec<Prepared> =
         pages.iter().map(|(page, vertices, _)| Prepared::new(page, *vertices, NORMAL_BITS)).collect();
     let mut statistics = Statistics::default();
@@ -158,6 +180,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         parts.connectivity += more.connectivity;
         parts.positions += more.positions;
         parts.normals += more.normals;
+        parts.colors += more.colors;
+        parts.points += more.points;
         records.push(NodeRecord {
             level: 1,
             first_child: 0,
@@ -171,7 +195,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             spacing: 0.0,
             vertices: *vertices,
             triangles: prepared.page().triangles.len() as u32,
-            points: 0,
+            points: prepared.page().positions.len() as u32 - vertices,
             borders: prepared.page().borders.len() as u32,
             bytes: bytes.len() as u32,
             checksum: 0,
@@ -188,7 +212,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         leaves: records.len() as u64,
         levels: 1,
         preserves_appearance: true,
-        has_colors: false,
+        has_colors: is_all,
         closed: false,
         up: UpAxis::Y,
     };
@@ -211,12 +235,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bytes: usize = coded.iter().map(Vec::len).sum();
     let part = |bits: f64| bits / 8.0 / triangles;
     println!(
-        "{{\"pages\":{},\"triangles\":{triangles},\"bytes_per_triangle\":{:.3},\"connectivity\":{:.3},\"positions\":{:.3},\"normals\":{:.3},\"model_bytes\":{model_bytes},\"m_triangles_per_second\":{:.2}}}",
+        "{{\"pages\":{},\"triangles\":{triangles},\"bytes_per_triangle\":{:.3},\"connectivity\":{:.3},\"positions\":{:.3},\"normals\":{:.3},\"colors\":{:.3},\"points\":{:.3},\"model_bytes\":{model_bytes},\"m_triangles_per_second\":{:.2}}}",
         pages.len(),
         bytes as f64 / triangles,
         part(parts.connectivity),
         part(parts.positions),
         part(parts.normals),
+        part(parts.colors),
+        part(parts.points),
         triangles / best / 1e6
     );
     Ok(())

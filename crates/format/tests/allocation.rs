@@ -5,6 +5,7 @@
 mod counting;
 
 use counting::peak_of;
+use gigalod_format::hybrid::{HybridFile, Model, NodeId};
 use gigalod_format::splats::{PageId, SplatFile};
 use gigalod_format::{Container, PageStore, checksum};
 use std::io;
@@ -35,7 +36,13 @@ impl PageStore for Sparse {
 
 /// A header with these sections, then `rest`.
 fn sparse(bytes: u64, skeleton: (u64, &[u8]), metadata_bytes: u64) -> Arc<Sparse> {
-    let mut head = b"\x89GLOD\r\n\x1a\x01\0\0\0\x01\0\0\0".to_vec();
+    sparse_of(1, bytes, skeleton, metadata_bytes)
+}
+
+/// The same of some kind.
+fn sparse_of(kind: u32, bytes: u64, skeleton: (u64, &[u8]), metadata_bytes: u64) -> Arc<Sparse> {
+    let mut head = b"\x89GLOD\r\n\x1a\x01\0\0\0".to_vec();
+    head.extend(kind.to_le_bytes());
     for field in [0, bytes, 128, skeleton.0] {
         head.extend(u64::to_le_bytes(field));
     }
@@ -87,4 +94,24 @@ fn claims_of_enormous_sections_allocate_next_to_nothing() {
         }
         assert!(peak < 80 << 10, "{peak} bytes");
     }
+
+    // A hybrid file of one node that claims the most there may be, in as few bytes as that takes.
+    let model = Model::default().to_bytes();
+    let mut skeleton = vec![0; 156];
+    skeleton[24..32].copy_from_slice(&1f64.to_le_bytes());
+    skeleton[80..97].copy_from_slice(&[1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1]);
+    skeleton[100..105].copy_from_slice(&[10, 9, 2, 0, 1]);
+    skeleton[108..112].copy_from_slice(&(model.len() as u32).to_le_bytes());
+    skeleton[136..145].copy_from_slice(&[0, 0, 0x10, 0, 0, 0x40, 0, 0, 0x10]);
+    let page_bytes = (6u32 << 20) / 256;
+    skeleton[148..152].copy_from_slice(&page_bytes.to_le_bytes());
+    skeleton[152..156].copy_from_slice(&checksum(&vec![0; page_bytes as usize]).to_le_bytes());
+    skeleton.extend(model);
+    let store = sparse_of(2, HUGE, (skeleton.len() as u64, &skeleton), 0);
+    let (found, peak) = peak_of(|| {
+        let file = HybridFile::open(Container::open(store).unwrap()).unwrap();
+        file.read_page(NodeId(0)).unwrap_err().to_string()
+    });
+    assert_eq!(found, "page 0: its code makes no sense");
+    assert!(peak < 8 << 20, "{peak} bytes");
 }

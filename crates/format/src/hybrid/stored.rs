@@ -75,7 +75,7 @@ fn axis_of([u, v]: [u8; 2]) -> Vec3 {
 /// The sine of a cone around the stored axis that holds one around the true axis; 255: every direction.
 fn sine_code(axis: Vec3, sine: f32, stored: Vec3) -> u8 {
     let length = axis.length();
-    if !(sine < 1.0 && sine >= 0.0 && length > 0.0) {
+    if !(0.0..1.0).contains(&sine) || !length.is_normal() {
         return 255;
     }
     let cosine = (1.0 - sine * sine).sqrt();
@@ -104,8 +104,8 @@ impl NodeRecord {
     /// `parent_place` is twice the parent's.
     fn put(&self, number: usize, parent_place: [i64; 3], out: &mut Vec<u8>) {
         let mut packed = u64::from(self.children) << (3 * PLACE_BITS);
-        for axis in 0..3 {
-            let mut place = i64::from(self.min_steps[axis]) - parent_place[axis] + PLACE_OFFSET;
+        for (axis, parent) in parent_place.into_iter().enumerate() {
+            let mut place = i64::from(self.min_steps[axis]) - parent + PLACE_OFFSET;
             if self.vertices + self.points == 0 {
                 place = place.clamp(0, (1 << PLACE_BITS) - 1);
             }

@@ -1,14 +1,28 @@
 //! What was written comes back: root, records, and each page, in the order that its coder said.
 
 use crate::made::{Made, NORMAL_BITS, Random, file, open, soups, tree};
+use crate::stranger::{self, Read};
 use gigalod_format::hybrid::{Model, NodeId, NodeRecord, Page, Prepared, Statistics};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
+/// What a stranger would read.
+fn by_the_document(page: &Page) -> Read {
+    Read {
+        positions: page.positions.clone(),
+        normals: page.normals.iter().map(|normal| [normal & 0xFFFF, normal >> 16]).collect(),
+        colors: page.colors.iter().map(|[red, green, blue, _]| [*red, *green, *blue]).collect(),
+        triangles: page.triangles.clone(),
+        borders: page.borders.clone(),
+    }
+}
+
 /// Writes a file of one page, reads it, and compares.
 fn comes_back(made: &Made) {
     let parts = tree(std::slice::from_ref(made), &mut Random(1));
-    let read = open(&file(&parts)).unwrap().read_page(NodeId(0)).unwrap();
+    let bytes = file(&parts);
+    let read = open(&bytes).unwrap().read_page(NodeId(0)).unwrap();
+    assert_eq!(stranger::read(&bytes), [by_the_document(&read)]);
     assert_eq!(read, Prepared::new(&made.page, made.vertices, NORMAL_BITS).into_page());
     assert_eq!(Made { page: read.clone(), vertices: made.vertices }.meaning(), made.meaning());
     let mut borders = Page::borders_of(&read.triangles);

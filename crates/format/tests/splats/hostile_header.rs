@@ -32,9 +32,10 @@ fn what_a_later_program_wrote_is_refused_by_name() {
         );
     }
     assert_eq!(
-        Forgery::new().u32(header::KIND, 2).refused(),
-        "the file holds representation 2, expected representation 1 (splats)"
+        Forgery::new().u32(header::KIND, 3).refused(),
+        "the file holds representation 3, expected 1 (splats) or 2 (hybrid)"
     );
+    assert_eq!(Forgery::new().u32(header::KIND, 2).refused(), "the file holds hybrid, expected splats");
 }
 
 #[test]

@@ -64,14 +64,14 @@ impl Streams {
         }
         let mut bits = BitReader::new(raw);
         let mut rare = vec![0; rare];
-        bits.numbers(&rare_classes, &mut rare, |out, number| *out = number)?;
+        bits.numbers::<2, _>(&rare_classes, &mut rare, |out, number| *out = number)?;
         Some(Self { tokens, rare, keys, shift, classes, bits })
     }
 
     /// Numbers of a stream; the streams' in order.
     fn numbers<T: Clone + Default>(&mut self, stream: usize, of: impl Fn(u32) -> T) -> Option<Vec<T>> {
         let mut out = vec![T::default(); self.classes[stream].len()];
-        self.bits.numbers(&self.classes[stream], &mut out, |out, number| *out = of(number))?;
+        self.bits.numbers::<3, _>(&self.classes[stream], &mut out, |out, number| *out = of(number))?;
         Some(out)
     }
 }
@@ -92,7 +92,7 @@ fn varint(bytes: &mut &[u8]) -> Option<usize> {
 struct Weaving<'a> {
     tokens: &'a [u8],
     rare: &'a [u32],
-    steps: &'a [Vec4],
+    /// At first the steps to them.
     points: &'a mut [Vec4],
     triangles: &'a mut [[u32; 3]],
     borders: &'a mut Vec<[u32; 2]>,
@@ -102,7 +102,7 @@ struct Weaving<'a> {
 /// All triangles, and the vertices that have none. What changes with each triangle is kept in variables.
 #[inline(never)]
 fn weave(weaving: Weaving<'_>) -> Option<()> {
-    let Weaving { tokens, rare, steps, points, triangles, borders, most_borders } = weaving;
+    let Weaving { tokens, rare, points, triangles, borders, most_borders } = weaving;
     let mut store = Store::new(points.len() + rare.len() + tokens.len(), points.len());
     let (mut front, mut at) = store.front();
     let mut rare = rare.iter();
@@ -113,7 +113,7 @@ fn weave(weaving: Weaving<'_>) -> Option<()> {
             for corner in &mut corners {
                 *corner = match *rare.next()? {
                     0 => {
-                        place_alone(points, steps, next_vertex)?;
+                        place_alone(points, next_vertex)?;
                         next_vertex += 1;
                         next_vertex - 1
                     }
@@ -128,13 +128,13 @@ fn weave(weaving: Weaving<'_>) -> Option<()> {
             let [a, mut b, mut c] = [at.from, at.to, at.opposite].map(|vertex| points[vertex as usize]);
             let plane = Plane::of(a, b, c);
             for _ in 0..added {
-                let step = *steps.get(next_vertex as usize)?;
-                let point = plane.position(parallelogram(a, b, c), step);
-                *points.get_mut(next_vertex as usize)? = point;
-                (c, b) = (b, point);
+                let place = points.get_mut(next_vertex as usize)?;
+                *place = plane.position(parallelogram(a, b, c), *place);
+                (c, b) = (b, *place);
                 *triangles.next()? = front.add(&mut at, next_vertex);
                 next_vertex += 1;
             }
+            front.link(&at);
             if u32::from(added) >= weave::MOST_ADDED {
                 continue;
             }
@@ -162,15 +162,16 @@ fn weave(weaving: Weaving<'_>) -> Option<()> {
         };
     }
     for vertex in next_vertex..points.len() as u32 {
-        place_alone(points, steps, vertex)?;
+        place_alone(points, vertex)?;
     }
     (at.is_closed && rare.len() == 0 && triangles.len() == 0).then_some(())
 }
 
 /// Places a vertex that begins a component or has no triangle.
-fn place_alone(points: &mut [Vec4], steps: &[Vec4], vertex: u32) -> Option<()> {
+fn place_alone(points: &mut [Vec4], vertex: u32) -> Option<()> {
     let before = vertex.checked_sub(1).map_or(Vec4::ZERO, |before| points[before as usize]);
-    *points.get_mut(vertex as usize)? = Plane::NONE.position(before, *steps.get(vertex as usize)?);
+    let place = points.get_mut(vertex as usize)?;
+    *place = Plane::NONE.position(before, *place);
     Some(())
 }
 
@@ -178,13 +179,12 @@ fn place_alone(points: &mut [Vec4], steps: &[Vec4], vertex: u32) -> Option<()> {
 pub(in super::super) fn decode(bytes: &[u8], model: &Model, record: &NodeRecord, root: &Root) -> Option<Page> {
     let (vertices, points, triangles) = (record.vertices as usize, record.points as usize, record.triangles as usize);
     let mut streams = Streams::read(bytes, model, record, root)?;
-    let mut steps = vec![Vec4::ZERO; vertices];
-    for coordinate in 0..3 {
-        streams.bits.numbers(&streams.classes[coordinate], &mut steps, |step, number| {
-            step[coordinate] = unfolded(number) as f32;
-        })?;
-    }
     let mut known = vec![Vec4::ZERO; vertices];
+    let [first, second, third, ..] = &streams.classes;
+    let step = |number| unfolded(number) as f32;
+    streams.bits.numbers::<3, _>(first, &mut known, |point, number| point.x = step(number))?;
+    streams.bits.numbers::<3, _>(second, &mut known, |point, number| point.y = step(number))?;
+    streams.bits.numbers::<3, _>(third, &mut known, |point, number| point.z = step(number))?;
     let mut page = Page {
         positions: vec![[0; 3]; vertices + points],
         triangles: vec![[0; 3]; triangles],
@@ -194,7 +194,6 @@ pub(in super::super) fn decode(bytes: &[u8], model: &Model, record: &NodeRecord,
     weave(Weaving {
         tokens: &streams.tokens,
         rare: &streams.rare,
-        steps: &steps,
         points: &mut known,
         triangles: &mut page.triangles,
         borders: &mut page.borders,
@@ -216,10 +215,9 @@ fn vertex_normals(page: &mut Page, streams: &mut Streams, known: &[Vec4], bits: 
     let most = ((1 << bits) - 1) as f32;
     let mask = (1 << bits) - 1;
     let mut differences = vec![[0; 2]; known.len()];
-    for coordinate in 0..2 {
-        let set = |difference: &mut [u16; 2], number: u32| difference[coordinate] = number as u16;
-        streams.bits.numbers(&streams.classes[3 + coordinate], &mut differences, set)?;
-    }
+    let [_, _, _, first, second, ..] = &streams.classes;
+    streams.bits.numbers::<3, _>(first, &mut differences, |[u, _], number| *u = number as u16)?;
+    streams.bits.numbers::<3, _>(second, &mut differences, |[_, v], number| *v = number as u16)?;
     let sums = predict::normals(known, &page.triangles);
     page.normals.reserve_exact(page.positions.len());
     page.normals.extend(sums.iter().zip(differences).map(|(sum, [u, v])| {

@@ -113,16 +113,21 @@ impl Front<'_> {
         At { focus: first, after: first + 1, from: a, to: b, opposite: c, is_closed: false, ..at }
     }
 
-    /// Joins a triangle with a vertex that is put between the two.
+    /// Joins a triangle with a vertex that is put between the two. After some of these, [`Self::link`] must come.
     #[inline(always)]
     pub(super) fn add(&mut self, at: &mut At, vertex: u32) -> [u32; 3] {
         let slot = self.give(at, Slot { vertex, next: at.after, previous: at.focus, opposite: at.from });
         self.slot(at.after).previous = slot;
-        self.slot(at.focus).next = slot;
         self.slot_of[vertex as usize] = slot;
         let triangle = [at.to, at.from, vertex];
         (at.after, at.opposite, at.to) = (slot, at.to, vertex);
         triangle
+    }
+
+    /// Ends a run of [`Self::add`].
+    #[inline(always)]
+    pub(super) fn link(&mut self, at: &At) {
+        self.slot(at.focus).next = at.after;
     }
 
     /// The slot and vertex that [`Self::close`] would join the edge with.
@@ -209,7 +214,9 @@ impl Front<'_> {
         let triangle = if is_there && slot != at.focus && slot != at.after {
             self.join_slot(&mut at, slot, vertex)
         } else {
-            self.add(&mut at, vertex)
+            let triangle = self.add(&mut at, vertex);
+            self.link(&at);
+            triangle
         };
         (at, triangle)
     }

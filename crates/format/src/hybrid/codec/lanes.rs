@@ -8,11 +8,11 @@
 //!
 //! Source: Giesen, *Interleaved entropy coders*, arXiv:1402.3392, 2014.
 
-use super::values::{BASES, EXTRA_BITS, SYMBOLS};
+use super::values::{BASES, EXTRA_BITS, MASKS, SYMBOLS};
 use crate::rans::{self, LOW};
 
-/// Lanes of a page. With 4 decoding takes a tenth longer, with 16 as long.
-pub(super) const LANES: usize = 8;
+/// Lanes of a page: with 8, their states do not fit a processor's registers, and decoding takes a sixteenth longer.
+pub(super) const LANES: usize = 4;
 /// Bits of a probability.
 pub(super) const SCALE_BITS: u32 = 11;
 const SCALE: u32 = 1 << SCALE_BITS;
@@ -20,7 +20,7 @@ const SCALE: u32 = 1 << SCALE_BITS;
 /// Probabilities of the symbols of a stream.
 pub(super) type Table = rans::Table<SCALE_BITS, SYMBOLS>;
 
-/// What a decoder looks up, by slot: symbol << 23 | frequency << 11 | place of the slot among the symbol's.
+/// What a decoder looks up, by slot: frequency << 20 | place of the slot among the symbol's << 8 | symbol.
 #[derive(Clone, Debug)]
 pub(super) struct Slots(Box<[u32; SCALE as usize]>);
 
@@ -30,8 +30,7 @@ impl Slots {
         for symbol in 0..SYMBOLS {
             let (start, end) = (table.start(symbol), table.end(symbol));
             for slot in start..end {
-                slots[usize::from(slot)] =
-                    (symbol as u32) << 23 | u32::from(end - start) << SCALE_BITS | u32::from(slot - start);
+                slots[usize::from(slot)] = u32::from(end - start) << 20 | u32::from(slot - start) << 8 | symbol as u32;
             }
         }
         Self(slots.into_boxed_slice().try_into().expect("there are as many as slots"))
@@ -88,12 +87,12 @@ impl Reader {
 #[inline(always)]
 fn step(state: &mut u32, slots: &Slots, words: &[u16; LANES], taken: &mut usize) -> u8 {
     let slot = slots.0[(*state & (SCALE - 1)) as usize];
-    let next = (slot >> SCALE_BITS & 0xFFF) * (*state >> SCALE_BITS) + (slot & (SCALE - 1));
+    let next = (slot >> 20) * (*state >> SCALE_BITS) + (slot >> 8 & 0xFFF);
     let word = u32::from(words[*taken & (LANES - 1)]);
     let short = next < LOW;
     *taken += usize::from(short);
     *state = if short { next << 16 | word } else { next };
-    (slot >> 23) as u8
+    slot as u8
 }
 
 /// Codes streams backwards: the last symbol of the last stream first.
@@ -118,7 +117,7 @@ impl Writer {
                 self.words.push(*state as u16);
                 *state >>= 16;
             }
-            *state = (*state / frequency << SCALE_BITS) + *state % frequency + u32::from(start);
+            *state = ((*state / frequency) << SCALE_BITS) + *state % frequency + u32::from(start);
         }
     }
 
@@ -170,18 +169,33 @@ impl BitReader {
         Self { bytes: padded, at: 0 }
     }
 
-    /// The numbers that classes and the next bits are, each given to `set`; `None` where bits end.
+    /// The numbers that classes and the next bits are, each given to `set`; `None` where bits end. So many are taken from the bits at a
+    /// time; their classes must not have more than 57 bits together.
     #[inline(always)]
-    pub(super) fn numbers<T>(&mut self, classes: &[u8], out: &mut [T], set: impl Fn(&mut T, u32)) -> Option<()> {
+    pub(super) fn numbers<const TOGETHER: usize, T>(
+        &mut self,
+        classes: &[u8],
+        out: &mut [T],
+        set: impl Fn(&mut T, u32),
+    ) -> Option<()> {
         let mut at = self.at;
-        for (class, out) in classes.iter().zip(out) {
-            let class = usize::from(*class) & (SYMBOLS - 1);
+        let mut some = |classes: &[u8], out: &mut [T]| {
             let chunk: &[u8; 8] = self.bytes.get(at >> 3..)?.first_chunk()?;
-            let bits = u64::from_le_bytes(*chunk) >> (at & 7);
-            let extra = EXTRA_BITS[class];
-            set(out, BASES[class] + (bits as u32 & ((1u32 << extra) - 1)));
-            at += usize::from(extra);
+            let mut bits = u64::from_le_bytes(*chunk) >> (at & 7);
+            for (class, out) in classes.iter().zip(out) {
+                let class = usize::from(*class);
+                set(out, BASES[class] + (bits as u32 & MASKS[class]));
+                bits >>= EXTRA_BITS[class];
+                at += usize::from(EXTRA_BITS[class]);
+            }
+            Some(())
+        };
+        let (rounds, rest) = classes.as_chunks::<TOGETHER>();
+        let (out_rounds, out_rest) = out.as_chunks_mut::<TOGETHER>();
+        for (classes, out) in rounds.iter().zip(out_rounds) {
+            some(classes, out)?;
         }
+        some(rest, out_rest)?;
         self.at = at;
         Some(())
     }

@@ -118,9 +118,7 @@ pub(super) fn octahedral(direction: Vec4, most: f32) -> [i32; 2] {
     let (x, y) = (x * scale, y * scale);
     let (folded_x, folded_y) = ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y));
     let (x, y) = if z < 0.0 { (folded_x, folded_y) } else { (x, y) };
-    [x, y].map(|coordinate| {
-        ((coordinate * 0.5 + 0.5) * most + ROUNDING).to_bits() as i32 - ROUNDING.to_bits() as i32
-    })
+    [x, y].map(|coordinate| ((coordinate * 0.5 + 0.5) * most + ROUNDING).to_bits() as i32 - ROUNDING.to_bits() as i32)
 }
 
 /// The edge between whose ends the colour of each vertex is expected: where it is the third corner of the first triangle that has it,
@@ -150,7 +148,7 @@ pub(super) fn wrapped(guess: i32, difference: u32, mask: u32) -> u32 {
 /// Undoes [`wrapped`].
 pub(super) fn difference(code: i32, guess: i32, bits: u32) -> u32 {
     let half = 1 << (bits - 1);
-    folded((code - guess + half & (1 << bits) - 1) - half)
+    folded(((code - guess + half) & ((1 << bits) - 1)) - half)
 }
 
 /// The code that a first normal is compared with.

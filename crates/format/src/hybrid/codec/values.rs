@@ -8,33 +8,47 @@ pub(super) const SYMBOLS: usize = 64;
 /// Numbers below this are their own classes; from here on there are two classes for each power of two.
 const SINGLE: u32 = 8;
 
-/// Smallest number of each class.
-pub(super) const BASES: [u32; SYMBOLS] = bases();
-/// Raw bits of each.
-pub(super) const EXTRA_BITS: [u8; SYMBOLS] = extra_bits();
+/// Entries of tables of classes, so that a byte needs no check; the rest is never used.
+const CLASSES: usize = 256;
 
-const fn bases() -> [u32; SYMBOLS] {
-    let mut bases = [0; SYMBOLS];
-    let mut class = 0;
-    while class < SYMBOLS {
-        let above = class as u32 - if class as u32 > SINGLE { SINGLE } else { class as u32 };
-        bases[class] =
-            if class as u32 <= SINGLE { class as u32 } else { (2 + above % 2) << (2 + above / 2) & 0xFFFF_FFFF };
+/// Smallest number of each class.
+pub(super) const BASES: [u32; CLASSES] = bases();
+/// Raw bits of each.
+pub(super) const EXTRA_BITS: [u8; CLASSES] = extra_bits();
+
+/// The lowest so many bits.
+pub(super) const MASKS: [u32; CLASSES] = masks();
+
+const fn bases() -> [u32; CLASSES] {
+    let mut bases = [0; CLASSES];
+    let mut class = 1;
+    while class < CLASSES {
+        bases[class] = if class < SYMBOLS { bases[class - 1] + (1 << EXTRA_BITS[class - 1]) } else { 0 };
         class += 1;
     }
     bases
 }
 
-const fn extra_bits() -> [u8; SYMBOLS] {
-    let mut bits = [0; SYMBOLS];
+const fn extra_bits() -> [u8; CLASSES] {
+    let mut bits = [0; CLASSES];
     let mut class = SINGLE as usize;
-    while class < SYMBOLS {
-        let bits_of_class = 2 + (class as u8 - SINGLE as u8) / 2;
-        // Classes beyond 32 bits are in no alphabet.
-        bits[class] = if bits_of_class > 30 { 30 } else { bits_of_class };
+    while class < CLASSES {
+        let bits_of_class = 2 + (class - SINGLE as usize) as u8 / 2;
+        // Classes beyond these are in no alphabet.
+        bits[class] = if bits_of_class > 21 { 21 } else { bits_of_class };
         class += 1;
     }
     bits
+}
+
+const fn masks() -> [u32; CLASSES] {
+    let mut masks = [0; CLASSES];
+    let mut class = 0;
+    while class < CLASSES {
+        masks[class] = (1 << EXTRA_BITS[class]) - 1;
+        class += 1;
+    }
+    masks
 }
 
 /// Class of a number.

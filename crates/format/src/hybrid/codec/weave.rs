@@ -186,7 +186,9 @@ impl Weaver<'_> {
             if self.added == MOST_ADDED {
                 self.end_token(0);
             }
-            front.add(at, number)
+            let triangle = front.add(at, number);
+            front.link(at);
+            triangle
         } else if front.can_close(at, number) {
             self.end_token(CLOSE);
             front.close(at).expect("it was asked")
