@@ -62,7 +62,7 @@ fn filled<'a>(
 }
 
 fn points(page: &Page, vertices: u32) -> u32 {
-    page.positions.len() as u32 - vertices
+    (page.positions.len() as u32).saturating_sub(vertices)
 }
 
 impl Plan {
@@ -118,6 +118,11 @@ impl Plan {
             plan.slices.extend(starts.map(|start| Slice { kind, runs: start..end.min(start + most_runs) }));
         }
         Ok(plan)
+    }
+
+    /// True where there is nothing to draw.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.slices.is_empty()
     }
 
     /// True where there are points or lines.

@@ -176,7 +176,7 @@ fn draw_triangle(node: Node, index: u32, number: u32, share: u32, shares: u32, i
     }
     let flat = flat_of(a, b, c, is_turned);
     let turned_area = cross_wide(flat.b - flat.a, flat.c - flat.a);
-    let per_area = 1.0 / float_of(turned_area);
+    let whole = float_of(turned_area);
     if is_turned {
         let third = c;
         c = b;
@@ -211,7 +211,7 @@ fn draw_triangle(node: Node, index: u32, number: u32, share: u32, shares: u32, i
             let side_bc = side_of(bc, center, ray);
             let side_ca = side_of(ca, center, ray);
             let is_inside = side_ab.is_inside && side_bc.is_inside && side_ca.is_inside;
-            var z = depth_in(flat, side_ca.area, side_ab.area, per_area);
+            var z = depth_in(flat, vec3f(side_bc.area, side_ca.area, side_ab.area), whole);
             if !is_tame {
                 z = max(eye_off * (1.0 / dot3(normal, ray)), frame.near);
             }
