@@ -189,6 +189,9 @@ fn neighbours_leave_no_pinhole_whatever_their_size_and_wherever_they_end() {
             for extent in [0, 16, 60] {
                 renderer.set_compute_extent(extent);
                 let drawn = picture(&mut renderer, &camera, &[(Similarity::IDENTITY, &draw)]);
+                if extent == 60 && rings < 20 {
+                    compare(&format!("plain_{rings}_{}", eye.y), &soup.mesh(&grid), &camera, &drawn, 0.1);
+                }
                 let holes = drawn.depth.iter().filter(|depth| !depth.is_finite()).count();
                 assert_eq!(holes, 0, "{rings} rings from {eye}, compute up to {extent} px");
             }
@@ -391,6 +394,60 @@ fn pages_stay_on_the_device_within_the_budget_and_a_frame_beyond_it_is_refused()
     assert!(refused > 0 && refused < 7, "{refused}");
     renderer.set_budget(None);
     assert!(same(&draw(&mut renderer, &[&large]).0.unwrap(), &first));
+}
+
+/// Frames of ever other nodes, within ever other budgets: each is that of a renderer that has seen nothing else.
+#[test]
+fn whatever_was_drawn_before_a_frame_is_the_same() {
+    let (Some(mut renderer), Some(mut fresh)) = (renderer(), renderer()) else { return };
+    let models = [120, 70].map(|rows| wavy(rows).model(&Grid::around(&wavy(rows)), 5, Extra::default()));
+    let camera = orbit(&models[0].bounds(), [30.0, 20.0], 1.5);
+    let least = {
+        let nothing = Frame { camera, look: Look::default(), draws: Vec::new() };
+        fresh.picture(&nothing).unwrap();
+        fresh.gpu_bytes()
+    };
+    let mut state = 3u64;
+    let mut random = |most: u64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) % most
+    };
+    let mut drawn = 0;
+    for frame in 0..24 {
+        let sources = [0, 1].map(|at| {
+            let DrawSource::Hybrid(mut list) = models[at].draw(at as u32, false) else { unreachable!() };
+            let keep = 1 + random(4);
+            list.nodes.retain(|_| random(4) < keep);
+            DrawSource::Hybrid(list)
+        });
+        let draws: Vec<_> = sources.iter().map(|source| (Similarity::IDENTITY, source)).collect();
+        renderer.set_budget((frame % 4 > 0).then(|| least + (random(10) << 18)));
+        match renderer.picture(&Frame { camera, look: Look::default(), draws: draws.clone() }) {
+            Ok(found) => {
+                fresh.recover().unwrap();
+                assert!(same(&found, &picture(&mut fresh, &camera, &draws)), "frame {frame}");
+                drawn += 1;
+            }
+            Err(RenderError::Budget { .. }) => {}
+            Err(other) => panic!("{other}"),
+        }
+    }
+    assert!(drawn > 8, "{drawn}");
+}
+
+#[test]
+fn a_node_without_anything_is_nothing() {
+    let Some(mut renderer) = renderer() else { return };
+    let soup = cube();
+    let grid = Grid::around(&soup);
+    let whole = soup.model(&grid, 1, Extra::default());
+    let mut record = *whole.file.skeleton().record(gigalod_format::hybrid::NodeId(0));
+    (record.vertices, record.triangles, record.borders) = (0, 0, 0);
+    let model = Model::new(&grid, false, vec![(record, gigalod_format::hybrid::Page::default())]);
+    let draw = model.draw(0, true);
+    let camera = orbit(&whole.bounds(), [30.0, 20.0], 1.0);
+    let drawn = picture(&mut renderer, &camera, &[(Similarity::IDENTITY, &draw)]);
+    assert!(drawn.depth.iter().all(|depth| *depth == f32::INFINITY));
 }
 
 #[test]

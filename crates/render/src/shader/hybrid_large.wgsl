@@ -159,18 +159,19 @@ fn draw_triangle(node: Node, index: u32, number: u32, share: u32, shares: u32, i
     var b = vertex_of(node, corners.y);
     var c = vertex_of(node, corners.z);
     let is_tame = a.tame && b.tame && c.tame;
-    // Its plane, through edges that are exact, and where the eye is.
-    let from_a = vec3i(position_of(node, corners.x));
-    let to_b = in_view(node, vec3f(vec3i(position_of(node, corners.y)) - from_a));
-    let to_c = in_view(node, vec3f(vec3i(position_of(node, corners.z)) - from_a));
-    let normal = vec3f(
+    // Its plane in whole steps, so that nothing is lost where it lies along an axis, however near the eye is; then in view.
+    let first = vec3i(position_of(node, corners.x));
+    let to_b = vec3f(vec3i(position_of(node, corners.y)) - first);
+    let to_c = vec3f(vec3i(position_of(node, corners.z)) - first);
+    let across = vec3f(
         to_b.y * to_c.z - to_b.z * to_c.y,
         to_b.z * to_c.x - to_b.x * to_c.z,
         to_b.x * to_c.y - to_b.y * to_c.x,
     );
-    let eye_off = dot3(normal, a.in_view);
+    let eye_off = dot3(across, vec3f(node.offset + first) + node.to_eye);
+    let normal = in_view(node, across) * (1.0 / dot3(node.right, node.right));
     let area = cross_wide(b.at - a.at, c.at - a.at);
-    let is_turned = select(eye_off > 0.0, area.high < 0i, is_tame);
+    let is_turned = select(eye_off < 0.0, area.high < 0i, is_tame);
     if select(eye_off == 0.0, (area.high | area.low) == 0i, is_tame) {
         return;
     }
