@@ -195,9 +195,13 @@ impl HybridPass {
             frame.shared.find(commands.encoder(), keys_bytes);
             let mut pass = gbuffer.begin(commands.encoder(), false);
             pass.set_pipeline(pipelines.resolve(resolving(frame.plan)));
-            pass.set_scissor_rect(0, rows.start, gbuffer.size.width, rows.end - rows.start);
-            pass.set_bind_group(0, &bound[2], &[offset(band, 0, 0)]);
-            pass.draw(0..3, 0..1);
+            let [columns, in_picture] = &frame.plan.window;
+            let (first, end) = (rows.start.max(in_picture.start), rows.end.min(in_picture.end));
+            if columns.start < columns.end && first < end {
+                pass.set_scissor_rect(columns.start, first, columns.end - columns.start, end - first);
+                pass.set_bind_group(0, &bound[2], &[offset(band, 0, 0)]);
+                pass.draw(0..3, 0..1);
+            }
         }
         Ok(true)
     }
