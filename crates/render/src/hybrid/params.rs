@@ -156,7 +156,8 @@ impl<'a> Seen<'a> {
             let part = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
             let view = camera.view_point(low - margin + (extent + 2.0 * margin) * part);
             // Written so that what is no number is everywhere.
-            if !(view.z > margin * 1e-3) {
+            let is_before_eye = view.z > margin * 1e-3;
+            if !is_before_eye {
                 return [DVec2::NEG_INFINITY, DVec2::INFINITY];
             }
             let px = camera.pixel_of_view_point(view);
