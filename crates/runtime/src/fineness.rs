@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 pub struct Fineness {
     /// Largest error on screen that is wanted, in pixels; 0 for everything there is.
     pub threshold_px: f32,
-    /// Most splats of all instances together. Where the threshold would need more, it is raised, in steps of at most 1/16, until
-    /// it does not; only one splat an instance is always drawn.
+    /// Most splats, triangles and points of all instances together. Where the threshold would need more, it is raised, in steps of at
+    /// most 1/16, until it does not; only the root of each instance is always drawn.
     pub most_splats: u64,
 }
 

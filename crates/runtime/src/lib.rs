@@ -23,10 +23,10 @@ pub mod view;
 
 pub use controller::FrameRate;
 pub use fineness::{Fineness, Interrupt};
-pub use hybrid::{HybridList, HybridNode};
+pub use hybrid::{HybridList, HybridNode, HybridSelector};
 pub use magnified::Magnified;
 pub use report::{CutReport, Limit};
-pub use residency::{FileId, Loader, PageKey, PageRequest, Residency};
+pub use residency::{FileId, Loader, ModelFile, PageKey, PageNumber, PageRequest, Residency};
 pub use scene::{Instance, Scene};
 pub use selection::{DeviceDraw, DrawSource, Outcome, RequestRing, SelectInput, Selection, Selector, Target};
 pub use splats::{SplatBall, SplatList, SplatSelector};

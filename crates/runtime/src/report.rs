@@ -27,6 +27,12 @@ impl Limit {
 pub struct CutReport {
     /// Nodes drawn.
     pub drawn: u64,
+    /// Triangles that these hold.
+    pub triangles: u64,
+    /// Points that these hold; each splat is one.
+    pub points: u64,
+    /// Lines that are drawn over their borders.
+    pub lines: u64,
     /// Nodes left out, with all that is below them, because the picture does not show where they are.
     pub culled_frustum: u64,
     /// Nodes left out because they show their back.
@@ -44,9 +50,15 @@ pub struct CutReport {
 }
 
 impl CutReport {
-    /// Takes note of a drawn error; `limit` says why it is above the threshold.
+    /// Triangles and points: what a cut is bounded by, and what its frame costs.
+    pub fn primitives(&self) -> u64 {
+        self.triangles + self.points
+    }
+
+    /// Takes note of a splat that is drawn with an error; `limit` says why that is above the threshold.
     pub fn drew(&mut self, error_px: f32, limit: Option<Limit>) {
         self.drawn += 1;
+        self.points += 1;
         self.max_error_px = self.max_error_px.max(error_px);
         self.limited_by = self.limited_by.max(limit);
     }
@@ -55,6 +67,9 @@ impl CutReport {
     pub fn merge(self, other: Self) -> Self {
         Self {
             drawn: self.drawn + other.drawn,
+            triangles: self.triangles + other.triangles,
+            points: self.points + other.points,
+            lines: self.lines + other.lines,
             culled_frustum: self.culled_frustum + other.culled_frustum,
             culled_backface: self.culled_backface + other.culled_backface,
             visited: self.visited + other.visited,

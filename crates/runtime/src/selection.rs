@@ -3,7 +3,7 @@
 use crate::hybrid::HybridList;
 use crate::residency::{FileId, PageRequest, Residency};
 use crate::splats::SplatList;
-use crate::{CutReport, InstanceId, Interrupt, ModelView, ViewId};
+use crate::{CutReport, InstanceId, Interrupt, ModelView, SplatSelector, ViewId};
 use std::collections::VecDeque;
 
 /// What selector state is keyed by: one instance in one view.
@@ -24,7 +24,7 @@ pub struct SelectInput<'a> {
     pub view: ModelView,
     /// Largest error on screen that is wanted, in pixels; 0 for everything there is.
     pub threshold_px: f32,
-    /// With more splats than these the cut is broken off.
+    /// With more splats, or triangles and points, than these the cut is broken off.
     pub most_splats: u64,
     /// Bytes that may be allocated for the list; where they are not enough, the cut is broken off.
     pub room_bytes: u64,
@@ -81,14 +81,20 @@ impl Selection {
         list + (self.requests.capacity() * size_of::<PageRequest>()) as u64
     }
 
-    /// The list on the host; an empty one takes the place of one on the device.
-    pub(crate) fn splats_mut(&mut self) -> &mut SplatList {
-        if !matches!(self.draw, DrawSource::Splats(_)) {
-            self.draw = DrawSource::default();
-        }
+    /// Empties the list; its memory is for the next ones, its pages may go.
+    pub(crate) fn release(&mut self, splats: &mut SplatSelector) {
         match &mut self.draw {
-            DrawSource::Splats(list) => list,
-            DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => unreachable!("replaced above"),
+            DrawSource::Splats(list) => splats.take_back(list),
+            DrawSource::Hybrid(list) => list.clear(),
+            DrawSource::OnDevice(_) => {}
+        }
+    }
+
+    /// Pieces of a list of splats.
+    pub(crate) fn pieces(&self) -> usize {
+        match &self.draw {
+            DrawSource::Splats(list) => list.pieces.len(),
+            DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => 0,
         }
     }
 }
@@ -100,7 +106,7 @@ pub enum Outcome {
     Complete,
     /// It was broken off; what it left is of no use.
     Interrupted,
-    /// It has more splats than were allowed; what it left is of no use.
+    /// It has more splats, or triangles and points, than were allowed; what it left is of no use.
     TooMany,
     /// Its list needs more memory than was allowed; what it left is of no use.
     NoRoom,

@@ -98,7 +98,7 @@ fn leaves_below(file: &SplatFile) -> BTreeMap<Place, Vec<Place>> {
 #[test]
 fn every_leaf_lies_below_exactly_one_node_that_is_drawn_or_culled() {
     let scene = everything_resident();
-    let below = leaves_below(scene.residency().file(FileId(0)));
+    let below = leaves_below(scene.residency().file(FileId(0)).splats().unwrap());
     let leaves = below.values().filter(|leaves| leaves.len() == 1).flatten().collect::<std::collections::BTreeSet<_>>();
     for (zoom, threshold_px) in [(1.0, 1.0), (1.0, 8.0), (6.0, 2.0), (40.0, 1.0), (0.02, 1.0)] {
         let (report, record) = record(&scene, 35.0, zoom, threshold_px, Cutting::default());
@@ -117,7 +117,7 @@ fn every_leaf_lies_below_exactly_one_node_that_is_drawn_or_culled() {
 #[test]
 fn backface_culling_changes_nothing_that_is_drawn() {
     let scene = everything_resident();
-    assert!(scene.residency().file(FileId(0)).skeleton().root().closed, "the statue is closed");
+    assert!(scene.residency().file(FileId(0)).splats().unwrap().skeleton().root().closed, "the statue is closed");
     for (azimuth, zoom, threshold_px) in [(0.0, 1.0, 1.0), (120.0, 1.0, 6.0), (200.0, 2.5, 2.0)] {
         let cutting = |backface_culling| Cutting { backface_culling, ..Cutting::default() };
         let (with, drawn_with) = record(&scene, azimuth, zoom, threshold_px, cutting(true));
@@ -160,7 +160,7 @@ fn a_page_that_is_damaged_is_told_and_its_parents_are_drawn() {
     let report = scene.select_converged(ViewId(0), &camera, &Fineness::px(0.0));
     let damaged: Vec<_> = scene.residency().damaged().map(|(key, why)| (key.page, why.to_string())).collect();
     assert_eq!(damaged.len(), 1);
-    assert_eq!(damaged[0].0, last);
+    assert_eq!(damaged[0].0, last.into());
     assert!(damaged[0].1.starts_with(&format!("page {last} has checksum")), "{}", damaged[0].1);
     assert_eq!(report.limited_by, Some(Limit::Residency));
     assert!(!report.inconsistent && report.drawn > 10_000);

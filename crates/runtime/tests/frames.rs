@@ -3,14 +3,14 @@
 mod common;
 
 use common::{camera, scene, statue};
-use gigalod_format::splats::{PageId, SplatFile};
+use gigalod_format::splats::PageId;
 use gigalod_runtime::residency::{InlineLoader, Loaded, Loader, ThreadedLoader};
 use gigalod_runtime::{
-    CutReport, DeviceDraw, DrawSource, FileId, Fineness, InstanceId, Interrupt, Limit, ModelView, Outcome, PageKey,
-    PageRequest, RequestRing, Residency, SelectInput, Selection, Selector, Similarity, SplatSelector, Target, ViewId,
+    CutReport, DeviceDraw, DrawSource, FileId, Fineness, InstanceId, Interrupt, Limit, ModelFile, ModelView, Outcome,
+    PageKey, PageNumber, PageRequest, RequestRing, Residency, SelectInput, Selection, Selector, Similarity,
+    SplatSelector, Target, ViewId,
 };
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 const CAMERA: ViewId = ViewId(0);
 const LIGHT: ViewId = ViewId(1);
@@ -141,7 +141,7 @@ struct LazyLoader {
 }
 
 impl Loader for LazyLoader {
-    fn queue(&mut self, key: PageKey, _file: Arc<SplatFile>) {
+    fn queue(&mut self, key: PageKey, _file: ModelFile) {
         self.queued.push(key);
     }
 
@@ -158,7 +158,7 @@ impl Loader for LazyLoader {
 fn requests_of_an_older_frame_are_cancelled_and_the_most_useful_come_first() {
     let mut residency = Residency::new(1 << 30, Box::<LazyLoader>::default());
     let file = residency.add(statue());
-    let request = |page, benefit| PageRequest { key: PageKey { file, page: PageId(page) }, benefit };
+    let request = |page, benefit| PageRequest { key: PageKey { file, page: PageNumber(page) }, benefit };
     residency.serve(&[request(0, 1.0), request(1, 5.0), request(0, 9.0)]);
     assert!(residency.is_loading());
     residency.serve(&[]);
@@ -166,7 +166,7 @@ fn requests_of_an_older_frame_are_cancelled_and_the_most_useful_come_first() {
     // Pages that do not exist, and files that do not, are nobody's business.
     residency.serve(&[
         request(u32::MAX, 1.0),
-        PageRequest { key: PageKey { file: FileId(7), page: PageId(0) }, benefit: 1.0 },
+        PageRequest { key: PageKey { file: FileId(7), page: PageNumber(0) }, benefit: 1.0 },
     ]);
     assert!(!residency.is_loading());
 }

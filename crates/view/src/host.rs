@@ -1,11 +1,10 @@
 //! What the viewer needs of whoever runs it: files are opened, built and written there, on threads of their own.
 
 use crate::pick::{Hit, Ray};
-use gigalod_format::splats::SplatFile;
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{CameraPath, ImageSize};
-use gigalod_runtime::Similarity;
 use gigalod_runtime::scene::description::SceneDescription;
+use gigalod_runtime::{ModelFile, Similarity};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +17,7 @@ pub struct Model {
     /// As the person named it.
     pub source: PathBuf,
     /// Its hierarchy.
-    pub file: Arc<SplatFile>,
+    pub file: ModelFile,
     /// What it was built from, where that lies at hand: picked points are exact then.
     pub original: Option<PathBuf>,
     /// Where it stands, at least once.
@@ -215,5 +214,5 @@ impl Work {
 
 /// Which way is up in a scene of these models: as the first has it.
 pub(crate) fn up_of(models: &[Model]) -> UpAxis {
-    models.first().map_or(UpAxis::Y, |model| model.file.skeleton().root().up)
+    models.first().map_or(UpAxis::Y, |model| model.file.up())
 }

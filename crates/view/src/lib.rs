@@ -19,6 +19,7 @@ pub mod navigation;
 mod overlay;
 mod panel;
 pub mod pick;
+pub mod pick_nodes;
 mod picker;
 pub mod recorder;
 mod report;

@@ -3,15 +3,14 @@
 //! What always holds: nobody waits for the other side; of wishes only the latest counts; a wish stops the refinement of the last
 //! one at once.
 
-use gigalod_format::splats::SplatFile;
 use gigalod_geom::{Camera, ImageSize};
 use gigalod_render::window::Shown;
 use gigalod_render::{Gpu, Look};
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, Interrupt, Similarity};
+use gigalod_runtime::{CutReport, Interrupt, ModelFile, Similarity};
 use std::collections::VecDeque;
 use std::path::PathBuf;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// What a person wants to see.
@@ -40,7 +39,7 @@ pub(crate) struct ModelKey(pub(crate) u64);
 /// Something to be done once.
 pub(crate) enum Order {
     /// Puts a model into the scene.
-    Add(ModelKey, Arc<SplatFile>, Vec<Similarity>),
+    Add(ModelKey, ModelFile, Vec<Similarity>),
     /// Takes it out again.
     Remove(ModelKey),
     /// A picture of what is shown as soon as it is as fine as it gets, or as it is when it is to change.

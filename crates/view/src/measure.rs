@@ -61,7 +61,7 @@ mod tests {
     use glam::DVec3;
 
     fn found(x: f64, uncertain: f64, to_come: bool) -> Option<Found> {
-        Some(Found { point: DVec3::X * x, uncertain, to_come })
+        Some(Found { point: DVec3::X * x, uncertain, detail: uncertain, to_come })
     }
 
     #[test]

@@ -6,9 +6,9 @@ use crate::navigation::Input;
 use crate::viewer::{Staged, Viewer};
 use egui::{CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, vec2};
 use gigalod_render::Kernel;
-use gigalod_runtime::Limit;
 use gigalod_runtime::scene::description::{Light, LightKind, Places, SceneCamera, SceneDescription, SceneModel};
 use gigalod_runtime::splats::Tint;
+use gigalod_runtime::{Limit, ModelFile};
 use std::path::{Path, PathBuf};
 
 /// Points.
@@ -48,11 +48,13 @@ impl Viewer {
                 if ui.small_button("x").on_hover_text("Take this model away").clicked() {
                     removed = Some(*key);
                 }
-                let leaves = model.file.skeleton().root().leaves;
                 let name = model.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 let text = match preview {
                     Some((_, points)) => format!("{name}, a preview of {} points", count(*points)),
-                    None => format!("{name}, {} splats", count(leaves)),
+                    None => match &model.file {
+                        ModelFile::Splats(file) => format!("{name}, {} splats", count(file.skeleton().root().leaves)),
+                        ModelFile::Hybrid(file) => format!("{name}, {} nodes", count(file.skeleton().root().nodes)),
+                    },
                 };
                 ui.add(egui::Label::new(text).truncate()).on_hover_text(model.source.display().to_string());
             });
@@ -172,13 +174,25 @@ impl Viewer {
         };
         let explained = "No point of the surface is drawn farther off than this: the diameter of the largest splat. Where the \
                          data end, as close up, it is larger than asked for";
-        let main = [
-            ("largest splat", explained, largest),
-            ("typical splat", "Half of the splats are no larger than this", format!("{:.2} px", figures.typical_px)),
-            ("splats drawn", "Of all that there are", count(report.drawn)),
+        let mut main = match report.triangles {
+            0 => {
+                let typical = format!("{:.2} px", figures.typical_px);
+                vec![
+                    ("largest splat", explained, largest),
+                    ("typical splat", "Half of the splats are no larger than this", typical),
+                    ("splats drawn", "Of all that there are", count(report.points)),
+                ]
+            }
+            triangles => vec![
+                ("largest error", "No point of the surface is drawn farther off than this", largest),
+                ("triangles drawn", "Of all levels of detail", count(triangles)),
+                ("points drawn", "For triangles smaller than a pixel, and splats", count(report.points)),
+            ],
+        };
+        main.extend([
             ("frame", "Choosing what to draw, and drawing it", format!("{:.0} ms", figures.frame_ms)),
             ("read", "From the file, so far", bytes(figures.bytes_read)),
-        ];
+        ]);
         rows(ui, "figures", &main);
         let more = [
             ("threshold", "Error that the last frame was cut at", format!("{:.2} px", report.threshold_px)),

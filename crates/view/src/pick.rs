@@ -1,4 +1,4 @@
-//! The surface under the cursor, from the leaves of the hierarchy: at full precision, although the display is coarse.
+//! The surface under the cursor, from the leaves of a hierarchy of splats: at full precision, although the display is coarse.
 //!
 //! Goes in: an open file, a ray in model space. Comes out: where the ray meets the surface that the leaves stand for. Nodes are opened
 //! in the order in which the ray enters their balls, so only pages along the ray are read, and no more than lead to the nearest
@@ -23,8 +23,17 @@ const MOST_PAGES: usize = 512;
 pub struct Hit {
     /// Ray parameter: the point is origin + t · direction.
     pub t: f64,
-    /// Radius of the leaf's ball, in model units: how far the point may be from the true surface.
+    /// How far the point may be from the true surface, in model units; of splats the radius of the leaf's ball.
     pub radius: f64,
+    /// How far the original's vertices are apart there, about, in model units: nothing is gained by coming much nearer.
+    pub detail: f64,
+}
+
+impl Hit {
+    /// A leaf's ball holds all triangles at its vertex.
+    pub fn on_ball(t: f64, radius: f64) -> Self {
+        Self { t, radius, detail: radius }
+    }
 }
 
 /// A half-line in model space; the direction's length is the unit of [`Hit::t`].
@@ -158,7 +167,7 @@ impl Pages {
                     match Patch::of(axis, ray.origin, center, normal, radius) {
                         Some(patch) => met.push(patch),
                         None if grazed.is_none() => {
-                            grazed = Some(Hit { t: (center - ray.origin).dot(axis), radius });
+                            grazed = Some(Hit::on_ball((center - ray.origin).dot(axis), radius));
                         }
                         None => {}
                     }
@@ -173,7 +182,7 @@ impl Pages {
                 // What is known is the parent's ball.
                 let center = root.origin + parent.center.as_dvec3();
                 let t = (center - ray.origin).dot(axis);
-                grazed = grazed.or(Some(Hit { t, radius: f64::from(parent.radius) }));
+                grazed = grazed.or(Some(Hit::on_ball(t, f64::from(parent.radius))));
                 continue;
             };
             let Some(word) = page.family_word(place.family) else { break };
@@ -196,7 +205,7 @@ impl Pages {
         }
         let unit = 1.0 / ray.direction.length();
         let hit = blend(&met).or(grazed).filter(|hit| hit.t > 0.0);
-        Ok(hit.map(|hit| Hit { t: hit.t * unit, radius: hit.radius }))
+        Ok(hit.map(|hit| Hit { t: hit.t * unit, ..hit }))
     }
 
     /// Balls that hold parts of the surface, all over the model, in model space: the smallest of the root's page.
@@ -274,5 +283,5 @@ fn blend(met: &[Patch]) -> Option<Hit> {
     let (weight, t, radius) = nearest.fold((0.0, 0.0, 0.0_f64), |(weight, t, radius), patch| {
         (weight + patch.weight, t + patch.weight * patch.t, radius.max(patch.radius))
     });
-    (weight > 0.0).then(|| Hit { t: t / weight, radius })
+    (weight > 0.0).then(|| Hit::on_ball(t / weight, radius))
 }

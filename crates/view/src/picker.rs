@@ -8,8 +8,10 @@ use crate::host::{Host, Model, Work};
 use crate::mailbox::ModelKey;
 use crate::navigation::Anchor;
 use crate::pick::{Hit, Pages, Ray};
+use crate::pick_nodes::NodePages;
+use gigalod_format::FormatError;
 use gigalod_geom::Camera;
-use gigalod_runtime::Similarity;
+use gigalod_runtime::{ModelFile, Similarity};
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,9 +52,9 @@ pub(crate) enum Answer {
 }
 
 impl Found {
-    /// What the camera may be held by: the point, with all that it may be off.
+    /// What the camera may be held by: the point, with all that it may be off, and as much around it as there is detail.
     pub(crate) fn anchor(&self) -> Anchor {
-        Anchor { at: self.point, radius: self.uncertain }
+        Anchor { at: self.point, radius: self.uncertain.max(self.detail) }
     }
 }
 
@@ -63,13 +65,37 @@ pub(crate) struct Found {
     pub(crate) point: DVec3,
     /// How far the true surface may be, world units; 0 for the original's own.
     pub(crate) uncertain: f64,
+    /// How far vertices are apart there, about, world units; 0 for the original's own.
+    pub(crate) detail: f64,
     /// The exact point is being looked for.
     pub(crate) to_come: bool,
 }
 
 struct Open {
     model: Model,
-    pages: Pages,
+    // Of these, one stays empty.
+    splats: Pages,
+    nodes: NodePages,
+}
+
+impl Open {
+    fn new(model: Model) -> Self {
+        Self { model, splats: Pages::default(), nodes: NodePages::default() }
+    }
+
+    fn first_hit(&mut self, ray: &Ray) -> Result<Option<Hit>, FormatError> {
+        match &self.model.file {
+            ModelFile::Splats(file) => self.splats.first_hit(file, ray),
+            ModelFile::Hybrid(file) => self.nodes.first_hit(file, ray),
+        }
+    }
+
+    fn anchors(&mut self, most: usize) -> Result<Vec<Anchor>, FormatError> {
+        match &self.model.file {
+            ModelFile::Splats(file) => self.splats.anchors(file, most),
+            ModelFile::Hybrid(file) => self.nodes.anchors(file, most),
+        }
+    }
 }
 
 /// Starts the thread, which ends when its questions do.
@@ -116,7 +142,7 @@ impl<W: Fn() + Send + Sync + 'static> Picker<W> {
             }
             match question {
                 Question::Add(key, model) => {
-                    self.open.insert(key, Open { model, pages: Pages::default() });
+                    self.open.insert(key, Open::new(model));
                     self.tell_anchors();
                 }
                 Question::Remove(key) => {
@@ -136,8 +162,10 @@ impl<W: Fn() + Send + Sync + 'static> Picker<W> {
 
     fn tell_anchors(&mut self) {
         let (mut anchors, mut problems) = (Vec::new(), Vec::new());
-        for Open { model, pages } in self.open.values_mut() {
-            match pages.anchors(&model.file, ANCHORS / model.placements.len().clamp(1, ANCHORS)) {
+        for open in self.open.values_mut() {
+            let balls = open.anchors(ANCHORS / open.model.placements.len().clamp(1, ANCHORS));
+            let model = &open.model;
+            match balls {
                 Ok(balls) => {
                     let all = model.placements.iter().flat_map(|place| balls.iter().map(move |ball| (place, ball)));
                     anchors.extend(all.map(|(place, Anchor { at, radius })| Anchor {
@@ -154,28 +182,31 @@ impl<W: Fn() + Send + Sync + 'static> Picker<W> {
 
     fn find(&mut self, purpose: Purpose, camera: &Camera, at_px: DVec2) {
         let direction = camera.ray_through(at_px);
-        let mut nearest: Option<(Hit, Ray, Similarity, &Model)> = None;
+        let mut nearest: Option<(Hit, Ray, Similarity, ModelKey)> = None;
         let mut problems = Vec::new();
-        for Open { model, pages } in self.open.values_mut() {
-            for place in &model.placements {
+        for (key, open) in &mut self.open {
+            for at in 0..open.model.placements.len() {
+                let place = open.model.placements[at];
                 let ray = Ray {
                     origin: place.model_point(camera.eye),
                     direction: place.model_direction(direction) / place.scale,
                 };
-                match pages.first_hit(&model.file, &ray) {
+                match open.first_hit(&ray) {
                     Ok(Some(hit)) if nearest.is_none_or(|(before, ..)| hit.t < before.t) => {
-                        nearest = Some((hit, ray, *place, model));
+                        nearest = Some((hit, ray, place, *key));
                     }
                     Ok(_) => {}
-                    Err(error) => problems.push(format!("{}: {error}", model.source.display())),
+                    Err(error) => problems.push(format!("{}: {error}", open.model.source.display())),
                 }
             }
         }
-        let found = nearest.map(|(hit, ray, place, model)| {
-            let exact = model.original.clone().filter(|_| matches!(purpose, Purpose::Measure(_)));
+        let found = nearest.map(|(hit, ray, place, key)| {
+            let original = self.open.get(&key).and_then(|open| open.model.original.clone());
+            let exact = original.filter(|_| matches!(purpose, Purpose::Measure(_)));
             let found = Found {
                 point: world(&place, ray.origin + ray.direction * hit.t),
                 uncertain: hit.radius * 2.0 * place.scale,
+                detail: hit.detail * 2.0 * place.scale,
                 to_come: exact.is_some(),
             };
             (found, exact.map(|original| (original, hit, ray, place)))
@@ -190,7 +221,7 @@ impl<W: Fn() + Send + Sync + 'static> Picker<W> {
         let search = move || {
             let exact = host.exact_point(&original, &ray, &hit, &Work::default());
             let better = match &exact {
-                Ok(Some(point)) => Found { point: world(&place, *point), uncertain: 0.0, to_come: false },
+                Ok(Some(point)) => Found { point: world(&place, *point), uncertain: 0.0, detail: 0.0, to_come: false },
                 Ok(None) | Err(_) => Found { to_come: false, ..found },
             };
             let _ = tell.send(Answer::Point { purpose, at_px, found: Some(better) });

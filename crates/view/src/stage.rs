@@ -152,7 +152,7 @@ impl Stage {
             self.renderer.set_budget(wish.gpu_budget);
             self.most_splats = u64::MAX;
         }
-        self.scene.splats_mut().tint = wish.tint;
+        self.scene.set_tint(wish.tint);
         (self.changed, self.stuck) = (true, false);
     }
 
@@ -264,8 +264,8 @@ impl Stage {
     fn survive(&mut self, error: RenderError, report: &CutReport) {
         match error {
             RenderError::DeviceLost(why) => self.lose(why),
-            RenderError::OutOfMemory(why) if report.drawn > FEWEST_SPLATS => {
-                self.most_splats = report.drawn / 2;
+            RenderError::OutOfMemory(why) if report.primitives() > FEWEST_SPLATS => {
+                self.most_splats = report.primitives() / 2;
                 let text = format!("the graphics device is out of memory, drawn coarser: {why}");
                 self.mailbox.tell(News::Problem(text));
             }

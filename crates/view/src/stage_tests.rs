@@ -62,7 +62,7 @@ fn a_lost_device_is_told_and_another_draws_what_was_asked_of_it() {
         cpu_budget: settings.cpu_budget,
         gpu_budget: settings.gpu_budget,
     };
-    mailbox.order(Order::Add(ModelKey(0), file.clone(), vec![Similarity::IDENTITY]));
+    mailbox.order(Order::Add(ModelKey(0), file.clone().into(), vec![Similarity::IDENTITY]));
     mailbox.wish(1, wish(20.0));
     mailbox.order(Order::Picture("before".into()));
     let (name, before) = hears(&mailbox, picture);

@@ -107,7 +107,7 @@ impl Person {
         let folder = tempfile::tempdir().unwrap();
         let statue = Model {
             source: "statue.glod".into(),
-            file: statue(folder.path()),
+            file: statue(folder.path()).into(),
             original: None,
             placements: vec![Similarity::IDENTITY],
         };
@@ -208,7 +208,7 @@ impl Person {
         let near = (0..=24).flat_map(|x| (0..=16).map(move |y| (x, y))).any(|(x, y)| {
             let at = DVec2::new(f64::from(x * size.width) / 24.0, f64::from(y * size.height) / 16.0);
             let ray = Ray { origin: camera.eye, direction: camera.ray_through(at) };
-            pages.first_hit(&self.files.statue.file, &ray).unwrap().is_some()
+            pages.first_hit(self.files.statue.file.splats().unwrap(), &ray).unwrap().is_some()
         });
         let view = camera.view_point(middle);
         let small = view.z > half.length() && {
@@ -476,7 +476,10 @@ fn who_comes_near_stops_before_the_surface() {
     let camera = person.viewer().camera(&at);
     let (x, y) = (f64::from(MIDDLE.x), f64::from(MIDDLE.y));
     let ray = Ray { origin: camera.eye, direction: camera.ray_through(DVec2::new(x, y)) };
-    let hit = crate::pick::Pages::default().first_hit(&person.files.statue.file, &ray).unwrap().expect("a surface");
+    let hit = crate::pick::Pages::default()
+        .first_hit(person.files.statue.file.splats().unwrap(), &ray)
+        .unwrap()
+        .expect("a surface");
     let leaves = hit.t * 2.0 * camera.tan_half_fov().y / (2.0 * hit.radius);
     assert!((8.0..40.0).contains(&leaves), "{leaves} leaves, one above the other");
 }

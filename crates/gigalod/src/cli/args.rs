@@ -136,7 +136,7 @@ pub(crate) struct DrawArgs {
     /// Width and height in pixels
     #[arg(long, default_value = "1280x720", value_parser = parse::image_size, value_name = "WxH")]
     pub(crate) size: ImageSize,
-    /// Largest error on screen, in pixels [default: 1]
+    /// Largest error on screen, in pixels [default: 1, the diameter of splats; 0.5 where all models are hybrid]
     #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "PX")]
     pub(crate) error: Option<f64>,
     /// Draw all leaves, whatever their size on screen

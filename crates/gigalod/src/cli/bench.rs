@@ -4,7 +4,7 @@ use super::args::BenchArgs;
 use super::error::{CliError, Outcome};
 use super::path_file;
 use super::progress::Console;
-use super::stage::{CAMERA, Stage, Wait};
+use super::stage::{CAMERA, Stage, Wait, primitives};
 use super::subject::Subject;
 use gigalod_build::Progress;
 use gigalod_geom::{Camera, CameraPath};
@@ -80,6 +80,8 @@ struct Run<'a> {
     stage: &'a mut Stage,
     path: CameraPath,
     args: &'a BenchArgs,
+    /// Error that is wanted.
+    finest_px: f32,
     console: &'a Console,
     look: Look,
     frames: Vec<FrameFigures>,
@@ -90,15 +92,17 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliErr
     let path = path_file::read(&args.path)?;
     let subject = Subject::open(&args.file, &args.build, console)?;
     let mut stage = Stage::open(&subject, args.draw.budgets())?;
-    stage.scene.splats_mut().tint = args.draw.tint();
+    stage.scene.set_tint(args.draw.tint());
+    let finest_px = args.draw.threshold_px(subject.default_error_px()) as f32;
     let look = args.draw.look(&subject.description);
-    let mut run = Run { stage: &mut stage, path, args, console, look, frames: Vec::new(), last: CutReport::default() };
+    let (stage_mut, last) = (&mut stage, CutReport::default());
+    let mut run = Run { stage: stage_mut, path, args, finest_px, console, look, frames: Vec::new(), last };
     let on_path = match args.target_ms {
         None => run.each_pose()?,
         Some(target_ms) => run.in_real_time(target_ms)?,
     };
     let (frames, last) = (run.frames, run.last);
-    let summary = summary(&frames, on_path, args);
+    let summary = summary(&frames, on_path, finest_px, args);
     let problems = stage.problems(&args.file, &last, console);
     let text = describe(&frames[..on_path], &summary, args);
     let report = BenchReport { adapter: stage.renderer.gpu().adapter(), frames, summary, problems };
@@ -110,7 +114,7 @@ impl Run<'_> {
     fn each_pose(&mut self) -> Result<usize, CliError> {
         let work = self.console.work("bench");
         work.begin("draw", self.path.frames.len() as u64);
-        let wanted = Fineness::px(self.args.draw.threshold_px() as f32);
+        let wanted = Fineness::px(self.finest_px);
         for index in 0..self.path.frames.len() {
             self.frame(self.path.frames[index].t, &wanted, true)?;
             work.at(index as u64 + 1);
@@ -123,7 +127,7 @@ impl Run<'_> {
         let work = self.console.work("bench");
         let (first, last) = (self.path.frames[0].t, self.path.frames[self.path.frames.len() - 1].t);
         work.begin("play", ((last - first) * 1e3) as u64);
-        let control = FrameRate::new(target_ms, self.args.draw.threshold_px() as f32).with_larger_pixels();
+        let control = FrameRate::new(target_ms, self.finest_px).with_larger_pixels();
         self.stage.control = Some(control);
         let begun = Instant::now();
         let mut before = None;
@@ -176,8 +180,8 @@ impl Run<'_> {
             frame_ms: drawn.frame_ms,
             select_ms: drawn.select_ms,
             upload_bytes: self.stage.renderer.uploaded_bytes(),
-            triangles: 0,
-            points: self.last.drawn,
+            triangles: self.last.triangles,
+            points: self.last.points,
             threshold_px: self.last.threshold_px,
             pixel_edge_px: drawn.pixel_edge_px,
             max_error_px: self.last.max_error_px.is_finite().then_some(self.last.max_error_px),
@@ -189,7 +193,7 @@ impl Run<'_> {
 }
 
 /// Figures over all frames; `on_path` of them show the path.
-fn summary(frames: &[FrameFigures], on_path: usize, args: &BenchArgs) -> Summary {
+fn summary(frames: &[FrameFigures], on_path: usize, finest_px: f32, args: &BenchArgs) -> Summary {
     let (path, rest) = frames.split_at(on_path);
     let sorted = |frames: &mut dyn Iterator<Item = &FrameFigures>| {
         let mut times: Vec<f64> = frames.map(|frame| frame.frame_ms).collect();
@@ -197,10 +201,10 @@ fn summary(frames: &[FrameFigures], on_path: usize, args: &BenchArgs) -> Summary
         times
     };
     let all = sorted(&mut if path.is_empty() { rest } else { path }.iter());
-    let finest_px = args.draw.threshold_px() as f32;
     let coarser = |frame: &&FrameFigures| frame.threshold_px > finest_px || frame.pixel_edge_px > 1.0;
     // Where there is nothing to draw, nothing makes a frame longer.
-    let paced = sorted(&mut path.iter().filter(|frame| frame.moved && frame.points > 0).filter(coarser));
+    let paced =
+        sorted(&mut path.iter().filter(|frame| frame.moved && frame.triangles + frame.points > 0).filter(coarser));
     let thresholds: Vec<f32> = rest.iter().map(|frame| frame.threshold_px).collect();
     let steps: Vec<f32> = thresholds.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step != 0.0).collect();
     let of = |part: f64| percentile(&all, part).unwrap_or(0.0);
@@ -241,8 +245,8 @@ fn describe(path: &[FrameFigures], summary: &Summary, args: &BenchArgs) -> Strin
     let mean = |of: fn(&FrameFigures) -> f64| path.iter().map(of).sum::<f64>() / path.len().max(1) as f64;
     let _ = writeln!(
         text,
-        "on average {:.0} splats, {:.1} ms to select them, {:.2} px; pixels {:.2} px wide",
-        mean(|frame| frame.points as f64),
+        "on average {}, {:.1} ms to select them, {:.2} px; pixels {:.2} px wide",
+        primitives(mean(|frame| frame.triangles as f64), mean(|frame| frame.points as f64)),
         mean(|frame| frame.select_ms),
         mean(|frame| f64::from(frame.threshold_px)),
         mean(|frame| frame.pixel_edge_px),

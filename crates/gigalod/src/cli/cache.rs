@@ -58,7 +58,7 @@ pub(crate) fn find(file: &Path, spacing: Option<f64>, at: &mut dyn FnMut(u64, u6
     }
     let folder = folder()?;
     let cached = folder.join(format!("{}.glod", key(file, spacing, at)?));
-    if cached.is_file() && files::open_splats(&cached).is_ok() && names_the_same(file, &list_of(&cached)) {
+    if cached.is_file() && files::open_built(&cached).is_ok() && names_the_same(file, &list_of(&cached)) {
         return Ok(Found::Built(cached));
     }
     std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;

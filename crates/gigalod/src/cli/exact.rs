@@ -13,8 +13,8 @@ use glam::DVec3;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// A leaf's ball holds all triangles at its vertex, and the triangle that is hit has a corner among its neighbours: so far around
-/// the hit, in radii of the leaf's ball, corners are looked for. Doubled as often as nothing is found.
+/// A leaf's ball holds all triangles at its vertex, and the triangle that is hit has a corner among its neighbours; or it is a leaf's
+/// own. So far around the hit, in distances of vertices, corners are looked for. Doubled as often as nothing is found.
 const REACHES: [f64; 3] = [8.0, 24.0, 72.0];
 
 /// Around a hit there are not more corners than these; what has more is not a model that was measured by its leaves.
@@ -29,7 +29,7 @@ pub(crate) fn point(
 ) -> Result<Option<DVec3>, CliError> {
     let around = ray.origin + ray.direction * near.t;
     for reach in REACHES {
-        let search = Search { ray, around, reach: near.radius * reach };
+        let search = Search { ray, around, reach: near.detail * reach };
         let found = search.run(original, is_cancelled)?;
         if found.is_some() {
             return Ok(found);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     fn judge(original: &Path, glod: &Path) -> Judged {
-        let file = files::open_splats(glod).unwrap();
+        let file = files::open_built(glod).unwrap().splats().unwrap().clone();
         let mut stream = files::open_model(original).unwrap();
         let mesh = gigalod::verify::mesh_of(gigalod_import::read_all(&mut *stream, &mut |_, _| {}).unwrap()).unwrap();
         let (bvh, diagonal) = (Bvh::build(&mesh), mesh.bounds().diagonal());
@@ -194,9 +194,9 @@ mod tests {
         let points: String = (0..20).flat_map(|x| (0..20).map(move |y| format!("{x} {y} 0.5\n"))).collect();
         std::fs::write(&cloud, points).unwrap();
         let ray = Ray { origin: DVec3::new(7.2, 11.4, 10.0), direction: DVec3::NEG_Z };
-        let found = point(&cloud, &ray, &Hit { t: 9.4, radius: 0.7 }, &|| false).unwrap();
+        let found = point(&cloud, &ray, &Hit::on_ball(9.4, 0.7), &|| false).unwrap();
         assert_eq!(found, Some(DVec3::new(7.0, 11.0, 0.5)));
         let missed = Ray { origin: DVec3::new(500.0, 11.4, 10.0), ..ray };
-        assert_eq!(point(&cloud, &missed, &Hit { t: 9.4, radius: 0.7 }, &|| false).unwrap(), None);
+        assert_eq!(point(&cloud, &missed, &Hit::on_ball(9.4, 0.7), &|| false).unwrap(), None);
     }
 }

@@ -2,9 +2,11 @@
 
 use super::error::CliError;
 use gigalod_build::{FileIdentity, SideLog};
-use gigalod_format::splats::SplatFile;
+#[cfg(feature = "view")]
+use gigalod_format::Kind;
 use gigalod_format::{Container, FileStore};
 use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
+use gigalod_runtime::ModelFile;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Component, Path};
@@ -62,9 +64,15 @@ pub(crate) fn open_container(path: &Path) -> Result<Container, CliError> {
     Container::open(Arc::new(store)).map_err(|error| CliError::format(path, &error))
 }
 
-/// Opens a `.glod` file of splats, the only kind there is.
-pub(crate) fn open_splats(path: &Path) -> Result<SplatFile, CliError> {
-    SplatFile::open(open_container(path)?).map_err(|error| CliError::format(path, &error))
+/// Opens a `.glod` file for drawing, of whichever kind it is.
+pub(crate) fn open_built(path: &Path) -> Result<ModelFile, CliError> {
+    ModelFile::open(open_container(path)?).map_err(|error| CliError::format(path, &error))
+}
+
+/// True of a `.glod` file that is hybrid; what is wrong with others is told by whoever opens them.
+#[cfg(feature = "view")]
+pub(crate) fn is_hybrid(path: &Path) -> bool {
+    is_container(path).is_ok_and(|is| is) && open_container(path).is_ok_and(|file| file.kind() == Kind::Hybrid)
 }
 
 /// True when the file begins as a `.glod` file does; anything else is taken for a raw model.

@@ -5,7 +5,7 @@ use super::error::{CliError, Outcome};
 use super::files;
 use super::path_file;
 use super::progress::Console;
-use super::stage::{Drawn, Stage, Wait};
+use super::stage::{Drawn, Stage, Wait, primitives};
 use super::subject::Subject;
 use gigalod_geom::camera::{DEFAULT_FOV_DEG, default_orbit_deg};
 use gigalod_geom::{Aabb, Camera, ImageSize};
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
     let camera = camera(&args.camera, args.draw.size, &stage.bounds(), &subject)?;
     let job = Job {
         camera,
-        threshold_px: args.draw.threshold_px(),
+        threshold_px: args.draw.threshold_px(subject.default_error_px()),
         look: args.draw.look(&subject.description),
         tint: args.draw.tint(),
         output: &args.output,
@@ -87,7 +87,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
 impl Stage {
     /// Draws one picture and writes it; `name` is what messages call the model.
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
-        self.scene.splats_mut().tint = job.tint;
+        self.scene.set_tint(job.tint);
         let wanted = Fineness::px(job.threshold_px as f32);
         let Drawn { report, select_ms, frame_ms, what: picture, .. } =
             self.draw_until(&job.camera, job.look, &wanted, Wait::Converged, Renderer::picture, console)?;
@@ -99,9 +99,9 @@ impl Stage {
         let problems = self.problems(name, &report, console);
         let json = self.report(job, &report, select_ms, frame_ms, problems);
         let text = format!(
-            "{}: {} splats, {}, in {frame_ms:.0} ms on {}\n",
+            "{}: {}, {}, in {frame_ms:.0} ms on {}\n",
             job.output.display(),
-            report.drawn,
+            primitives(report.triangles as f64, report.points as f64),
             finish(&report),
             self.renderer.gpu().adapter(),
         );
@@ -127,7 +127,12 @@ impl Stage {
             max_error_px: report.max_error_px.is_finite().then_some(f64::from(report.max_error_px)),
             converged: complete,
             limited_by: report.limited_by.map(|limit| limit.name()),
-            drawn: DrawnCounts { nodes: report.drawn, triangles: 0, points: report.drawn, lines: 0 },
+            drawn: DrawnCounts {
+                nodes: report.drawn,
+                triangles: report.triangles,
+                points: report.points,
+                lines: report.lines,
+            },
             culled: Culled { frustum: report.culled_frustum, backface: report.culled_backface },
             bytes_read: residency.bytes_read(),
             cpu_bytes: self.scene.cpu_bytes(),
@@ -142,7 +147,10 @@ impl Stage {
 /// How fine a picture became, in words.
 fn finish(report: &CutReport) -> String {
     let coarsest = if report.max_error_px.is_finite() {
-        format!("{:.2} px across", report.max_error_px)
+        // Of splats that is a diameter.
+        format!("{:.2} px {}", report.max_error_px, if report.triangles == 0 { "across" } else { "off" })
+    } else if report.drawn == 0 {
+        "not there at all".into()
     } else {
         "around the eye itself".into()
     };

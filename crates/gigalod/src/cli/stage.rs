@@ -136,8 +136,8 @@ impl Stage {
                     self.happened(format!("the graphics device was lost and is opened anew: {why}"), console);
                     self.renderer.recover().map_err(graphics_error)?;
                 }
-                Err(RenderError::OutOfMemory(why)) if report.drawn > FEWEST_SPLATS => {
-                    self.most_splats = report.drawn / 2;
+                Err(RenderError::OutOfMemory(why)) if report.primitives() > FEWEST_SPLATS => {
+                    self.most_splats = report.primitives() / 2;
                     self.happened(format!("the graphics device is out of memory, drawn coarser: {why}"), console);
                 }
                 Err(error) => return Err(graphics_error(error)),
@@ -168,9 +168,9 @@ impl Stage {
 }
 
 impl DrawArgs {
-    /// Largest error on screen, in pixels; 0 for everything there is.
-    pub(crate) fn threshold_px(&self) -> f64 {
-        if self.full { 0.0 } else { self.error.unwrap_or(1.0) }
+    /// Largest error on screen, in pixels; 0 for everything there is. `default_px` where nobody says.
+    pub(crate) fn threshold_px(&self, default_px: f64) -> f64 {
+        if self.full { 0.0 } else { self.error.unwrap_or(default_px) }
     }
 
     /// As asked for; what is not asked for, as the scene has it.
@@ -188,6 +188,14 @@ impl DrawArgs {
 
     pub(crate) fn tint(&self) -> Tint {
         if self.lod_colors { Tint::Level } else { Tint::Model }
+    }
+}
+
+/// What was drawn, in words.
+pub(crate) fn primitives(triangles: f64, points: f64) -> String {
+    match triangles {
+        0.0 => format!("{points:.0} splats"),
+        _ => format!("{triangles:.0} triangles, {points:.0} points"),
     }
 }
 

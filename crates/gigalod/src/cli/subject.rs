@@ -6,19 +6,23 @@ use super::error::CliError;
 use super::files;
 use super::progress::Console;
 use super::scene_file;
-use gigalod_format::splats::SplatFile;
 use gigalod_geom::camera::UpAxis;
-use gigalod_runtime::Similarity;
 use gigalod_runtime::scene::description::SceneDescription;
+use gigalod_runtime::{ModelFile, Similarity};
 use std::path::Path;
-use std::sync::Arc;
+
+/// Default of `--error` where all models are hybrid.
+pub(crate) const HYBRID_ERROR_PX: f64 = 0.5;
+
+/// Where some are splats.
+pub(crate) const SPLAT_ERROR_PX: f64 = 1.0;
 
 /// Models in their places, open.
 pub(crate) struct Subject {
     /// What the scene says besides; nothing for a single model.
     pub(crate) description: SceneDescription,
     /// At least one.
-    pub(crate) models: Vec<(Arc<SplatFile>, Vec<Similarity>)>,
+    pub(crate) models: Vec<(ModelFile, Vec<Similarity>)>,
 }
 
 impl Subject {
@@ -33,7 +37,7 @@ impl Subject {
         }
         let open = |model: &gigalod_runtime::scene::description::SceneModel| {
             let container = cache::container_of(&model.file, options, console)?;
-            Ok((Arc::new(files::open_splats(&container)?), scene_file::places(&model.places)?))
+            Ok((files::open_built(&container)?, scene_file::places(&model.places)?))
         };
         let models = description.models.iter().map(open).collect::<Result<_, CliError>>()?;
         Ok(Self { description, models })
@@ -41,13 +45,19 @@ impl Subject {
 
     /// Opens a `.glod` file.
     pub(crate) fn of_container(file: &Path) -> Result<Self, CliError> {
-        let splats = Arc::new(files::open_splats(file)?);
-        Ok(Self { description: SceneDescription::default(), models: vec![(splats, vec![Similarity::IDENTITY])] })
+        let model = files::open_built(file)?;
+        Ok(Self { description: SceneDescription::default(), models: vec![(model, vec![Similarity::IDENTITY])] })
+    }
+
+    /// Largest error on screen, in pixels, where nobody says: of triangles half a pixel; the diameter of a splat is a pixel.
+    pub(crate) fn default_error_px(&self) -> f64 {
+        let is_hybrid = self.models.iter().all(|(file, _)| file.hybrid().is_some());
+        if is_hybrid { HYBRID_ERROR_PX } else { SPLAT_ERROR_PX }
     }
 
     /// Which way is up: as the scene says, or the first model.
     pub(crate) fn up(&self) -> UpAxis {
-        let first = self.models.first().map(|(file, _)| file.skeleton().root().up);
+        let first = self.models.first().map(|(file, _)| file.up());
         self.description.up.or(first).unwrap_or_default()
     }
 }

@@ -121,8 +121,7 @@ fn read_scan(path: &Path) -> Result<Scan, CliError> {
 
 fn path(args: &PathArgs) -> Result<(u64, usize), CliError> {
     files::check_output(&args.output, &[&args.around])?;
-    let splats = files::open_splats(&args.around)?;
-    let root = splats.skeleton().root();
+    let model = files::open_built(&args.around)?;
     let kind = match args.kind {
         PathKindArg::Orbit => PathKind::Orbit,
         PathKindArg::Approach => PathKind::Approach,
@@ -130,7 +129,7 @@ fn path(args: &PathArgs) -> Result<(u64, usize), CliError> {
         PathKindArg::SuddenTurn => PathKind::SuddenTurn,
     };
     let options = PathOptions { seconds: args.seconds, seed: args.seed };
-    let made = camera_path(kind, &root.bounds, root.up, options);
+    let made = camera_path(kind, &model.bounds(), model.up(), options);
     let bytes = path_file::write(&args.output, &made)?;
     Ok((bytes, made.frames.len()))
 }

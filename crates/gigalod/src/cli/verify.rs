@@ -8,7 +8,8 @@ use super::inputs::{Inputs, Sense};
 use super::progress::Console;
 use gigalod::verify::{self, Measured, Problems, Sampled, SplatTree};
 use gigalod_build::{Progress, SideLog};
-use gigalod_format::{InputCounts, Metadata};
+use gigalod_format::splats::SplatFile;
+use gigalod_format::{InputCounts, Kind, Metadata};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, LengthUnit};
 use gigalod_import::{Batch, Material, read_all};
@@ -36,7 +37,12 @@ struct MeasuredReport {
 }
 
 pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliError> {
-    let splats = files::open_splats(&args.file)?;
+    let container = files::open_container(&args.file)?;
+    if container.kind() != Kind::Splats {
+        let kind = container.kind().name();
+        return Err(CliError::in_file(&args.file, format!("a {kind} file, verify checks splat files only as yet")));
+    }
+    let splats = SplatFile::open(container).map_err(|error| CliError::format(&args.file, &error))?;
     // The metadata is not needed for drawing, but it has a checksum too.
     let metadata = splats.container().read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
     let name = args.file.file_name().unwrap_or_default().to_string_lossy().into_owned();

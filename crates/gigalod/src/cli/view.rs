@@ -2,8 +2,10 @@
 
 use super::args::ViewArgs;
 use super::error::{CliError, Outcome};
+use super::files;
 use super::path_file;
 use super::progress::Console;
+use super::subject::{HYBRID_ERROR_PX, SPLAT_ERROR_PX};
 use super::view_files::Files;
 use gigalod_geom::camera::DEFAULT_FOV_DEG;
 use gigalod_view::{FirstLook, Options, Report, Settings, ViewError, percentile};
@@ -79,6 +81,9 @@ pub(crate) fn run(args: &ViewArgs, _console: &Console) -> Result<Outcome, CliErr
         _ => args.camera.orbit.map_or(FirstLook::Whole, FirstLook::Orbit),
     };
     let look = args.draw.look(&Default::default());
+    // Known only of files that need not be built.
+    let is_hybrid = !args.files.is_empty() && args.files.iter().all(|file| files::is_hybrid(file));
+    let default_px = if is_hybrid { HYBRID_ERROR_PX } else { SPLAT_ERROR_PX };
     let options = Options {
         files: args.files.clone(),
         settings: Settings {
@@ -86,7 +91,7 @@ pub(crate) fn run(args: &ViewArgs, _console: &Console) -> Result<Outcome, CliErr
             towards_light: look.lighting.towards_light,
             background: look.lighting.background,
             tint: args.draw.tint(),
-            finest_px: args.draw.threshold_px() as f32,
+            finest_px: args.draw.threshold_px(default_px) as f32,
             target_ms: args.target_ms,
             cpu_budget: args.draw.cpu_budget,
             gpu_budget: args.draw.gpu_budget,
@@ -132,7 +137,7 @@ fn json(report: Report) -> ViewReport {
         threshold_px: has_drawn.then_some(last.report.threshold_px),
         max_error_px: (has_drawn && last.report.max_error_px.is_finite()).then_some(last.report.max_error_px),
         limited_by: last.report.limited_by.map(|limit| limit.name()),
-        splats: last.report.drawn,
+        splats: last.report.primitives(),
         bytes_read: last.bytes_read,
         measured: measured.map(|measured| Distance {
             points: measured.points.iter().map(|point| point.to_array()).collect(),

@@ -102,7 +102,7 @@ impl Files {
         if original.is_some() {
             cache::note_place(path, &container);
         }
-        let file = Arc::new(files::open_splats(&container)?);
+        let file = files::open_built(&container)?;
         Ok(Model { source: path.to_owned(), file, original, placements })
     }
 
@@ -123,7 +123,7 @@ impl Files {
                     && !is_late()
                 {
                     let (source, placements) = (path.to_owned(), placements.to_vec());
-                    let model = Model { source, file: Arc::new(file), original: None, placements };
+                    let model = Model { source, file: Arc::new(file).into(), original: None, placements };
                     work.preview(Preview { model, points });
                 }
             });

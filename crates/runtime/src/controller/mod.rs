@@ -159,7 +159,7 @@ impl FrameRate {
         if self.resting {
             return 1.0;
         }
-        let work = |step: u32| Work::new(report.drawn as f64, area_px, edge_px(step));
+        let work = |step: u32| Work::new(report.primitives() as f64, area_px, edge_px(step));
         let time = |step: u32| (cut_ms + self.cost.ms(&work(step))) / self.own_ms;
         let now = time(self.edge_step);
         if self.cost.is_known() && !(EDGE_BAND[0]..=EDGE_BAND[1]).contains(&now) {
@@ -177,7 +177,7 @@ impl FrameRate {
 
     /// Takes note of a frame: how long it took from beginning to end, what it drew, and whether finer pages are on their way.
     pub fn drew(&mut self, frame_ms: f64, report: &CutReport, loading: bool) {
-        let splats = report.drawn as f64;
+        let splats = report.primitives() as f64;
         let threshold_px = f64::from(report.threshold_px);
         let usual_px = threshold_px / THRESHOLD_TO_DIAMETER;
         let area_px = self.area_px.unwrap_or(splats * usual_px * usual_px * std::f64::consts::FRAC_PI_4);

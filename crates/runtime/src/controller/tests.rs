@@ -39,7 +39,8 @@ impl Machine {
         while splats(px) > wanted.most_splats as f64 {
             px *= 1.02;
         }
-        let report = CutReport { drawn: splats(px) as u64, threshold_px: px, ..CutReport::default() };
+        let report =
+            CutReport { drawn: splats(px) as u64, points: splats(px) as u64, threshold_px: px, ..CutReport::default() };
         let area_px = splats(px) * diameter(px).powi(2) * 0.785;
         let larger = control.most_edge_step > 0;
         // A quarter of what a splat costs is the cut's.

@@ -1,5 +1,15 @@
 //! Hybrid: the cut through an octree of simplified triangles and points.
+//!
+//! Source: the hybrid paper, section 4. Differs: the error is bounded where a node may be seen, rather than at its middle, and a node
+//! is opened only when all its children in sight are resident.
+//!
+//! Start at [`HybridSelector`]; `look` says what a view knows of a node, `family` how a cut goes down.
 
+mod area;
+mod family;
 mod list;
+mod look;
+mod selector;
 
 pub use list::{HybridList, HybridNode};
+pub use selector::{CHECK_NODES, HybridSelector};

@@ -1,10 +1,9 @@
 //! Who reads and decodes pages: threads, or the caller's own.
 
 use super::PageKey;
+use super::file::{DecodedPage, ModelFile};
 use gigalod_format::FormatError;
-use gigalod_format::splats::{Page, SplatFile};
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 /// A page that was asked for, or why it cannot be had.
 #[derive(Debug)]
@@ -12,13 +11,13 @@ pub struct Loaded {
     /// What was asked for.
     pub key: PageKey,
     /// Decoded.
-    pub page: Result<Page, FormatError>,
+    pub page: Result<DecodedPage, FormatError>,
 }
 
 /// Reads and decodes pages outside the render thread.
 pub trait Loader: Send {
     /// Adds a page to the queue; the first in are the first to be loaded.
-    fn queue(&mut self, key: PageKey, file: Arc<SplatFile>);
+    fn queue(&mut self, key: PageKey, file: ModelFile);
 
     /// Empties the queue; returns what was in it. What is being loaded at the moment still arrives.
     fn cancel_queued(&mut self) -> Vec<PageKey>;
@@ -31,11 +30,11 @@ pub trait Loader: Send {
 /// Loads in [`Loader::finished`], on the caller's thread, one page a call: for tests, and where there are no threads.
 #[derive(Default)]
 pub struct InlineLoader {
-    queue: VecDeque<(PageKey, Arc<SplatFile>)>,
+    queue: VecDeque<(PageKey, ModelFile)>,
 }
 
 impl Loader for InlineLoader {
-    fn queue(&mut self, key: PageKey, file: Arc<SplatFile>) {
+    fn queue(&mut self, key: PageKey, file: ModelFile) {
         self.queue.push_back((key, file));
     }
 
@@ -54,12 +53,12 @@ pub use threaded::ThreadedLoader;
 #[cfg(not(target_arch = "wasm32"))]
 mod threaded {
     use super::*;
-    use std::sync::{Condvar, Mutex, mpsc};
+    use std::sync::{Arc, Condvar, Mutex, mpsc};
     use std::thread::JoinHandle;
 
     #[derive(Default)]
     struct Queue {
-        waiting: VecDeque<(PageKey, Arc<SplatFile>)>,
+        waiting: VecDeque<(PageKey, ModelFile)>,
         closed: bool,
     }
 
@@ -111,7 +110,7 @@ mod threaded {
     }
 
     impl Loader for ThreadedLoader {
-        fn queue(&mut self, key: PageKey, file: Arc<SplatFile>) {
+        fn queue(&mut self, key: PageKey, file: ModelFile) {
             let (queue, changed) = &*self.queue;
             queue.lock().expect("nobody panics while holding the queue").waiting.push_back((key, file));
             changed.notify_one();

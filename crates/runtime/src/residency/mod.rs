@@ -3,18 +3,28 @@
 //! Requests go in, from whomever; pages come out later. Each frame's requests replace the last frame's as far as their
 //! loading has not begun, so nobody waits for what the camera has left behind. The most useful byte is loaded first. To make
 //! room, the page that was used longest ago goes; pages used in the current frame stay, and a page's ancestors are used
-//! whenever it is.
+//! whenever it is. What a list holds stays too: its memory would not be free.
+//!
+//! Representations differ in what a page is, and in nothing else: [`ModelFile`] says how large one is and reads it.
 
+mod file;
 mod loader;
+mod table;
 
+pub use file::{DecodedPage, ModelFile, PageNumber};
 #[cfg(not(target_arch = "wasm32"))]
 pub use loader::ThreadedLoader;
 pub use loader::{InlineLoader, Loaded, Loader};
 
-use gigalod_format::splats::{Page, PageId, SplatFile};
+pub(crate) use table::PageTable;
+
+use gigalod_format::hybrid::NodeId;
+use gigalod_format::splats::PageId;
+use gigalod_format::{hybrid, splats};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::AtomicU32;
+use table::Table;
 
 /// One open file of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -26,7 +36,7 @@ pub struct PageKey {
     /// Which file.
     pub file: FileId,
     /// Which of its pages.
-    pub page: PageId,
+    pub page: PageNumber,
 }
 
 /// Somebody would draw better with this page.
@@ -40,54 +50,8 @@ pub struct PageRequest {
 
 /// The pages of one file.
 struct FilePages {
-    file: Arc<SplatFile>,
-    /// Shared with the threads of a cut while it is made.
-    table: Arc<PageTable>,
-}
-
-/// Which pages of a file are resident.
-#[derive(Debug)]
-pub(crate) struct PageTable {
-    resident: Vec<Option<Arc<Page>>>,
-    /// Frame in which each page was last used.
-    last_used: Vec<AtomicU32>,
-}
-
-impl PageTable {
-    fn new(pages: usize) -> Self {
-        Self { resident: vec![None; pages], last_used: (0..pages).map(|_| AtomicU32::new(0)).collect() }
-    }
-
-    /// The page, if it is resident. Any number is fine.
-    #[inline(always)]
-    pub(crate) fn get(&self, page: PageId) -> Option<&Page> {
-        self.resident.get(page.0 as usize)?.as_deref()
-    }
-
-    /// The same, and marks it as used in `frame`. Threads that use the same pages do not write in each other's way.
-    #[inline(always)]
-    pub(crate) fn used(&self, page: PageId, frame: u32) -> Option<&Page> {
-        let resident = self.get(page)?;
-        let last_used = self.last_used.get(page.0 as usize)?;
-        if last_used.load(Ordering::Relaxed) != frame {
-            last_used.store(frame, Ordering::Relaxed);
-        }
-        Some(resident)
-    }
-}
-
-impl Clone for PageTable {
-    fn clone(&self) -> Self {
-        let last_used = self.last_used.iter().map(|frame| AtomicU32::new(frame.load(Ordering::Relaxed))).collect();
-        Self { resident: self.resident.clone(), last_used }
-    }
-}
-
-impl FilePages {
-    /// To change. The table is shared only while a cut is made; it is copied where one never ended because it panicked.
-    fn table_mut(&mut self) -> &mut PageTable {
-        Arc::make_mut(&mut self.table)
-    }
+    file: ModelFile,
+    table: Table,
 }
 
 /// All resident pages of all files.
@@ -138,9 +102,16 @@ impl Residency {
     }
 
     /// Makes a file's pages known; none is loaded before it is asked for.
-    pub fn add(&mut self, file: Arc<SplatFile>) -> FileId {
-        let pages = file.skeleton().pages().len();
-        self.files.push(FilePages { file, table: Arc::new(PageTable::new(pages)) });
+    pub fn add(&mut self, file: impl Into<ModelFile>) -> FileId {
+        let file = file.into();
+        let table = match &file {
+            ModelFile::Splats(_) => Table::splats(file.pages()),
+            ModelFile::Hybrid(_) => Table::hybrid(file.pages()),
+        };
+        self.files.push(FilePages { file, table });
+        // As many as may be listed: what a budget leaves for pages must not shrink when they are.
+        self.idle.clear();
+        self.idle.reserve(self.files.iter().map(|pages| pages.table.len()).sum());
         FileId(self.files.len() as u32 - 1)
     }
 
@@ -148,18 +119,44 @@ impl Residency {
     ///
     /// # Panics
     /// When `id` is of another residency.
-    pub fn file(&self, id: FileId) -> &Arc<SplatFile> {
+    pub fn file(&self, id: FileId) -> &ModelFile {
         &self.files[id.0 as usize].file
     }
 
-    /// The page, if it is resident; marks it as used. Any page number is fine: there is none beyond the last.
-    pub fn page(&self, file: FileId, page: PageId) -> Option<&Page> {
-        self.files[file.0 as usize].table.used(page, self.frame)
+    /// The page of a splat file, if it is resident; marks it as used. Any page number is fine: there is none beyond the last.
+    pub fn page(&self, file: FileId, page: PageId) -> Option<&splats::Page> {
+        match &self.files[file.0 as usize].table {
+            Table::Splats(table) => table.used(page, self.frame),
+            Table::Hybrid(_) => None,
+        }
     }
 
-    /// The pages of a file, and what to mark them with that are used now.
-    pub(crate) fn table(&self, file: FileId) -> (Arc<PageTable>, u32) {
-        (self.files[file.0 as usize].table.clone(), self.frame)
+    /// The page of a node of a hybrid file, if it is resident; marks it as used. Any number is fine.
+    pub fn node(&self, file: FileId, node: NodeId) -> Option<&Arc<hybrid::Page>> {
+        match &self.files[file.0 as usize].table {
+            Table::Hybrid(table) => table.used_shared(node, self.frame),
+            Table::Splats(_) => None,
+        }
+    }
+
+    /// A splat file, its pages, and what to mark them with that are used now.
+    pub(crate) fn splats(&self, id: FileId) -> Option<(&Arc<splats::SplatFile>, &Arc<PageTable<splats::Page>>, u32)> {
+        match self.files.get(id.0 as usize) {
+            Some(FilePages { file: ModelFile::Splats(file), table: Table::Splats(table) }) => {
+                Some((file, table, self.frame))
+            }
+            _ => None,
+        }
+    }
+
+    /// The same of a hybrid file.
+    pub(crate) fn hybrid(&self, id: FileId) -> Option<(&Arc<hybrid::HybridFile>, &PageTable<hybrid::Page>, u32)> {
+        match self.files.get(id.0 as usize) {
+            Some(FilePages { file: ModelFile::Hybrid(file), table: Table::Hybrid(table) }) => {
+                Some((file, table, self.frame))
+            }
+            _ => None,
+        }
     }
 
     /// Ends the frame: loads what was asked for in it, as far as the budget allows, instead of what was asked for before.
@@ -202,8 +199,9 @@ impl Residency {
     /// True of a page that there is, that is neither resident nor being loaded, and that is not known to be damaged.
     fn is_to_come(&self, key: PageKey) -> bool {
         let file = self.files.get(key.file.0 as usize);
-        let there = file.and_then(|pages| pages.table.resident.get(key.page.0 as usize));
-        matches!(there, Some(None)) && !self.damaged.contains_key(&key) && !self.in_flight.contains(&key)
+        let is_missing =
+            |pages: &FilePages| (key.page.0 as usize) < pages.table.len() && !pages.table.is_resident(key.page);
+        file.is_some_and(is_missing) && !self.damaged.contains_key(&key) && !self.in_flight.contains(&key)
     }
 
     /// Takes in what has been loaded; with `wait`, blocks until there is something, if anything is under way.
@@ -216,17 +214,14 @@ impl Residency {
             self.incoming_bytes -= self.bytes_to_come(key);
             match page {
                 // Asked for when there was more room.
-                Ok(page)
-                    if self.resident_bytes + self.incoming_bytes + page.resident_bytes() as u64 > self.budget_bytes =>
-                {
+                Ok(page) if self.resident_bytes + self.incoming_bytes + page.resident_bytes() > self.budget_bytes => {
                     self.refused += 1;
                 }
                 Ok(page) => {
-                    self.resident_bytes += page.resident_bytes() as u64;
-                    let frame = self.frame;
-                    let table = self.files[key.file.0 as usize].table_mut();
-                    table.resident[key.page.0 as usize] = Some(Arc::new(page));
-                    table.last_used[key.page.0 as usize].store(frame, Ordering::Relaxed);
+                    let bytes = page.resident_bytes();
+                    if self.files[key.file.0 as usize].table.insert(key.page, page, self.frame) {
+                        self.resident_bytes += bytes;
+                    }
                 }
                 Err(error) => {
                     self.damaged.insert(key, error.to_string());
@@ -236,7 +231,7 @@ impl Residency {
         count
     }
 
-    /// Replaces the budget; where pages take more, the oldest go at once, whatever is drawn with them.
+    /// Replaces the budget; where pages take more, the oldest go at once, used or not, but for those that a list holds.
     pub fn set_budget(&mut self, budget_bytes: u64) {
         self.budget_bytes = budget_bytes;
         if self.resident_bytes + self.incoming_bytes > budget_bytes {
@@ -245,9 +240,10 @@ impl Residency {
                 self.incoming_bytes -= self.bytes_to_come(key);
             }
         }
-        let excess = (self.resident_bytes + self.incoming_bytes).saturating_sub(budget_bytes).min(self.resident_bytes);
+        let excess = (self.resident_bytes + self.incoming_bytes).saturating_sub(budget_bytes);
         if excess > 0 {
-            self.evict(excess, |_| true);
+            self.list_idle(|_| true);
+            self.evict_idle(excess);
         }
     }
 
@@ -268,8 +264,8 @@ impl Residency {
 
     /// Bytes of what is kept about pages, resident or not.
     pub fn directory_bytes(&self) -> u64 {
-        let entry = size_of::<Option<Arc<Page>>>() + size_of::<AtomicU32>();
-        let pages = self.files.iter().map(|pages| pages.table.resident.len() * entry).sum::<usize>();
+        let entry = size_of::<Option<Arc<splats::Page>>>() + size_of::<AtomicU32>();
+        let pages = self.files.iter().map(|pages| pages.table.len() * entry).sum::<usize>();
         let lists =
             self.wanted.capacity() * size_of::<PageRequest>() + self.idle.capacity() * size_of::<(u32, PageKey, u64)>();
         (pages + lists) as u64
@@ -292,9 +288,7 @@ impl Residency {
 
     /// What a page will take once it is decoded.
     fn bytes_to_come(&self, key: PageKey) -> u64 {
-        let skeleton = self.files[key.file.0 as usize].file.skeleton();
-        let word_bytes = if skeleton.root().has_colors { 6 } else { 4 };
-        size_of::<Page>() as u64 + u64::from(skeleton.record(key.page).words) * word_bytes
+        self.files[key.file.0 as usize].file.bytes_to_come(key.page)
     }
 
     /// Evicts until `bytes` more fit; false, with nothing evicted in vain, where they cannot.
@@ -304,40 +298,41 @@ impl Residency {
             return true;
         };
         let frame = self.frame;
-        self.evict(excess, |last_used| last_used < frame)
+        let enough = self.list_idle(|last_used| last_used < frame) >= excess;
+        if enough {
+            self.evict_idle(excess);
+        }
+        enough
     }
 
-    /// Evicts at least so many bytes of pages that may go by the frame in which they were last used, oldest first; false, with
-    /// nothing evicted in vain, where there are not so many.
-    fn evict(&mut self, excess: u64, may_go: impl Fn(u32) -> bool) -> bool {
+    /// Lists pages that nobody holds and that may go by the frame in which they were last used; returns their bytes.
+    fn list_idle(&mut self, may_go: impl Fn(u32) -> bool) -> u64 {
         let mut idle = std::mem::take(&mut self.idle);
         idle.clear();
         for (file, pages) in self.files.iter().enumerate() {
-            for (page, resident) in pages.table.resident.iter().enumerate() {
-                let last_used = pages.table.last_used[page].load(Ordering::Relaxed);
-                if let Some(resident) = resident
-                    && may_go(last_used)
-                {
-                    let key = PageKey { file: FileId(file as u32), page: PageId(page as u32) };
-                    idle.push((last_used, key, resident.resident_bytes() as u64));
+            pages.table.for_each_resident(|resident| {
+                if may_go(resident.last_used) && !resident.is_held {
+                    let key = PageKey { file: FileId(file as u32), page: resident.page };
+                    idle.push((resident.last_used, key, resident.bytes));
                 }
-            }
-        }
-        let enough = idle.iter().map(|(_, _, bytes)| bytes).sum::<u64>() >= excess;
-        if enough {
-            // Of equally old pages the finer one, which comes later in the file, goes first.
-            idle.sort_unstable_by_key(|(last_used, key, _)| (*last_used, std::cmp::Reverse(*key)));
-            let mut freed = 0;
-            for (_, key, bytes) in &idle {
-                if freed >= excess {
-                    break;
-                }
-                self.files[key.file.0 as usize].table_mut().resident[key.page.0 as usize] = None;
-                freed += bytes;
-            }
-            self.resident_bytes -= freed;
+            });
         }
         self.idle = idle;
-        enough
+        self.idle.iter().map(|(_, _, bytes)| bytes).sum()
+    }
+
+    /// Evicts at least so many bytes of what was listed, oldest first, or all of it.
+    fn evict_idle(&mut self, excess: u64) {
+        // Of equally old pages the finer one, which comes later in the file, goes first.
+        self.idle.sort_unstable_by_key(|(last_used, key, _)| (*last_used, std::cmp::Reverse(*key)));
+        let mut freed = 0;
+        for (_, key, bytes) in &self.idle {
+            if freed >= excess {
+                break;
+            }
+            self.files[key.file.0 as usize].table.remove(key.page);
+            freed += bytes;
+        }
+        self.resident_bytes -= freed;
     }
 }

@@ -1,11 +1,11 @@
-//! Cuts within budgets: of splats, of memory.
+//! Cuts within budgets: of splats, triangles and points, of memory.
 //!
 //! In: what is asked for. Out: the cut at the threshold asked for, or at the first one above it that fits.
 //! What always holds: a view's instances are cut at one threshold; the last complete cut stays until the next one is, where that is
 //! asked for; the threshold depends on the camera, the budgets and what is resident, not on the frames before.
 
 use super::{Instance, Lists, Scene};
-use crate::residency::PageRequest;
+use crate::residency::{ModelFile, PageRequest};
 use crate::selection::{Outcome, SelectInput, Selector, Target};
 use crate::splats::{SplatList, coarser};
 use crate::{CutReport, Fineness, Interrupt, Limit, ModelView, ViewId};
@@ -62,11 +62,11 @@ impl Scene {
         for (_, lists) in self.lists.iter_mut().filter(|(target, _)| target.view == view) {
             if beside {
                 std::mem::swap(&mut lists.shown, &mut lists.next);
-                self.splats.take_back(lists.next.splats_mut());
+                lists.next.release(&mut self.splats);
             }
             limit(&mut lists.shown.report);
             self.requests.extend_from_slice(&lists.shown.requests);
-            used += lists.shown.splats_mut().pieces.len();
+            used += lists.shown.pieces();
         }
         if self.cpu_budget == u64::MAX {
             self.splats.give_away(used, beside);
@@ -92,7 +92,7 @@ impl Scene {
         // The memory of all of them is there for each of them.
         for (_, lists) in self.lists.iter_mut().filter(|(target, _)| target.view == view) {
             let replaced = if beside { &mut lists.next } else { &mut lists.shown };
-            self.splats.take_back(replaced.splats_mut());
+            replaced.release(&mut self.splats);
         }
         for (instance, Instance { file, placement }) in &self.instances {
             let target = Target { instance: *instance, view };
@@ -110,11 +110,15 @@ impl Scene {
                 residency: &self.residency,
             };
             let selection = if beside { next } else { shown };
-            match self.splats.select(target, &input, selection) {
+            let selector: &mut dyn Selector = match self.residency.file(*file) {
+                ModelFile::Splats(_) => &mut self.splats,
+                ModelFile::Hybrid(_) => &mut self.hybrid,
+            };
+            match selector.select(target, &input, selection) {
                 Outcome::Complete => {}
                 other => return Err(other),
             }
-            splats_left -= selection.report.drawn;
+            splats_left -= selection.report.primitives();
             report = report.merge(selection.report);
         }
         Ok(report)
@@ -139,7 +143,11 @@ impl Scene {
                 interrupt,
                 residency: &self.residency,
             };
-            if !self.splats.count_into(&input, &mut self.search) {
+            let is_counted = match self.residency.file(*file) {
+                ModelFile::Splats(_) => self.splats.count_into(&input, &mut self.search),
+                ModelFile::Hybrid(_) => self.hybrid.count_into(&input, &mut self.search),
+            };
+            if !is_counted {
                 return None;
             }
         }
@@ -149,7 +157,7 @@ impl Scene {
     /// Bytes of lists, and of what makes them.
     fn list_bytes(&self) -> u64 {
         let lists = self.lists.values().map(|lists| lists.shown.bytes() + lists.next.bytes()).sum::<u64>();
-        lists + self.splats.bytes()
+        lists + self.splats.bytes() + self.hybrid.bytes()
     }
 
     pub(super) fn bytes_besides_pages(&self) -> u64 {
@@ -164,7 +172,9 @@ impl Scene {
 
     /// Splats of a view that the memory has room for, with a list beside it that is shown meanwhile, and pieces not quite full.
     fn most_splats_in_memory(&self) -> u64 {
-        if self.cpu_budget == u64::MAX {
+        // Lists of nodes are short, whatever these hold.
+        let is_splats = |instance: &Instance| self.residency.file(instance.file).splats().is_some();
+        if self.cpu_budget == u64::MAX || !self.instances.values().any(is_splats) {
             return u64::MAX;
         }
         // Keys come by instance: those of the first one are all views.

@@ -5,8 +5,8 @@ pub mod description;
 
 use crate::residency::{FileId, PageRequest, Residency};
 use crate::selection::{DrawSource, Selection, Selector, Target};
-use crate::splats::ThresholdSearch;
-use crate::{CutReport, Fineness, InstanceId, Interrupt, ModelView, Similarity, SplatSelector, ViewId};
+use crate::splats::{ThresholdSearch, Tint};
+use crate::{CutReport, Fineness, HybridSelector, InstanceId, Interrupt, ModelView, Similarity, SplatSelector, ViewId};
 use gigalod_geom::{Aabb, Camera};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,6 +25,7 @@ pub struct Scene {
     residency: Residency,
     instances: BTreeMap<InstanceId, Instance>,
     splats: SplatSelector,
+    hybrid: HybridSelector,
     /// What cuts answered; kept so that buffers are reused.
     lists: BTreeMap<Target, Lists>,
     /// Of all targets since the last [`Scene::serve`].
@@ -53,6 +54,7 @@ impl Scene {
             residency,
             instances: BTreeMap::new(),
             splats: SplatSelector::default(),
+            hybrid: HybridSelector::default(),
             lists: BTreeMap::new(),
             requests: Vec::new(),
             cpu_budget: u64::MAX,
@@ -75,16 +77,27 @@ impl Scene {
         let gone: Vec<Target> = self.lists.keys().copied().filter(|target| target.instance == instance).collect();
         for target in gone {
             if let Some(mut lists) = self.lists.remove(&target) {
-                self.splats.take_back(lists.shown.splats_mut());
-                self.splats.take_back(lists.next.splats_mut());
+                lists.shown.release(&mut self.splats);
+                lists.next.release(&mut self.splats);
             }
             self.splats.forget(target);
+            self.hybrid.forget(target);
         }
     }
 
     /// How the splat hierarchies are cut.
     pub fn splats_mut(&mut self) -> &mut SplatSelector {
         &mut self.splats
+    }
+
+    /// How the hybrid hierarchies are cut.
+    pub fn hybrid_mut(&mut self) -> &mut HybridSelector {
+        &mut self.hybrid
+    }
+
+    /// How everything is coloured.
+    pub fn set_tint(&mut self, tint: Tint) {
+        (self.splats.tint, self.hybrid.tint) = (tint, tint);
     }
 
     /// What is resident.
@@ -101,7 +114,7 @@ impl Scene {
     pub fn bounds(&self) -> Aabb {
         let corners = self.instances.values().flat_map(|instance| {
             let placement = instance.placement;
-            let bounds = self.residency.file(instance.file).skeleton().root().bounds;
+            let bounds = self.residency.file(instance.file).bounds();
             bounds.corners().map(|corner| placement.position + placement.rotation * (corner * placement.scale))
         });
         Aabb::of(corners)
@@ -111,8 +124,10 @@ impl Scene {
     pub fn set_cpu_budget(&mut self, bytes: u64) {
         self.cpu_budget = bytes;
         for lists in self.lists.values_mut() {
-            self.splats.take_back(lists.shown.splats_mut());
-            self.splats.take_back(lists.next.splats_mut());
+            for list in [&mut lists.shown, &mut lists.next] {
+                list.release(&mut self.splats);
+                list.draw = DrawSource::default();
+            }
         }
         self.splats.give_away(0, false);
         self.leave_the_rest_to_pages();
@@ -139,8 +154,9 @@ impl Scene {
     ) -> Option<CutReport> {
         let report = self.cut(view, camera, fineness, interrupt, true);
         if report.is_none() {
-            // What is still shown still wants its pages.
-            for lists in self.lists.iter().filter(|(target, _)| target.view == view).map(|(_, lists)| lists) {
+            // What is still shown still wants its pages; what was not finished does not.
+            for (_, lists) in self.lists.iter_mut().filter(|(target, _)| target.view == view) {
+                lists.next.release(&mut self.splats);
                 self.requests.extend_from_slice(&lists.shown.requests);
             }
         }
@@ -155,12 +171,13 @@ impl Scene {
             .filter_map(|(target, lists)| Some((self.instances.get(&target.instance)?, &lists.shown)))
     }
 
-    /// Pixels of `camera`'s picture that the last cut of `view` covers, each splat by itself; an estimate. Lists that lie on the
+    /// Pixels of `camera`'s picture that the last cut of `view` covers, each splat and node by itself; an estimate. Lists that lie on the
     /// device are not counted.
     pub fn area_px(&self, view: ViewId, camera: &Camera) -> f64 {
         let area_px = |(instance, selection): (&Instance, &Selection)| match &selection.draw {
             DrawSource::Splats(list) => list.area_px(&ModelView::new(camera, &instance.placement)),
-            DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => 0.0,
+            DrawSource::Hybrid(list) => list.area_px(&ModelView::new(camera, &instance.placement)),
+            DrawSource::OnDevice(_) => 0.0,
         };
         self.draws(view).map(area_px).sum()
     }

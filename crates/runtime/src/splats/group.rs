@@ -46,7 +46,7 @@ pub(super) struct Inconsistent;
 impl<'a> Stored<'a> {
     /// Reads a group.
     #[inline(always)]
-    pub(super) fn read(table: &'a PageTable, group: &Group) -> Result<Self, Inconsistent> {
+    pub(super) fn read(table: &'a PageTable<Page>, group: &Group) -> Result<Self, Inconsistent> {
         let page = table.get(group.page).ok_or(Inconsistent)?;
         let (start, count) = (usize::from(group.word.0), usize::from(group.count));
         let rest = page.words().get(start..).ok_or(Inconsistent)?;
@@ -67,7 +67,7 @@ impl<'a> Stored<'a> {
 
     /// Where the children are; marks their page as used in `frame`.
     #[inline(always)]
-    pub(super) fn below(&self, table: &PageTable, frame: u32) -> Result<Below, Inconsistent> {
+    pub(super) fn below(&self, table: &PageTable<Page>, frame: u32) -> Result<Below, Inconsistent> {
         let family = self.page.family(self.pointer.ok_or(Inconsistent)?);
         match table.used(family.page, frame) {
             Some(page) => Ok(Below::At(family.page, page.family_word(family.family).ok_or(Inconsistent)?)),

@@ -22,7 +22,7 @@ use crate::residency::{PageKey, PageRequest};
 use crate::selection::{DrawSource, Outcome, SelectInput, Selection, Selector, Target};
 use crate::{CutReport, Limit};
 use crew::Crew;
-use gigalod_format::splats::PageId;
+use gigalod_format::splats::{PageId, Root};
 use gigalod_geom::color::rgb565_of_srgb8;
 use gigalod_geom::projected;
 use gigalod_geom::quantise::normal;
@@ -176,14 +176,14 @@ impl SplatSelector {
 
     /// Counts a hierarchy for a budget. False where it was broken off.
     pub(crate) fn count_into(&self, input: &SelectInput<'_>, search: &mut ThresholdSearch) -> bool {
-        let root = input.residency.file(input.file).skeleton().root();
-        let (table, frame) = input.residency.table(input.file);
+        let Some((file, table, frame)) = input.residency.splats(input.file) else { return true };
+        let root = file.skeleton().root();
         if table.used(PageId(0), frame).is_none() {
             search.count_root();
             return true;
         }
         let look = Look::new(&input.view, root, self.cutting, input.threshold_px);
-        search.count(look, (&table, frame), root, input.interrupt)
+        search.count(look, (table, frame), root, input.interrupt)
     }
 
     fn cut_into(
@@ -193,14 +193,13 @@ impl SplatSelector {
         out: &mut Selection,
         list: &mut SplatList,
     ) -> Outcome {
-        let file = input.residency.file(input.file);
-        let root = file.skeleton().root();
-        let (table, frame) = input.residency.table(input.file);
         self.take_back(list);
         out.report = CutReport { threshold_px: input.threshold_px, ..CutReport::default() };
+        let Some((file, table, frame)) = input.residency.splats(input.file) else { return Outcome::Complete };
+        let root = file.skeleton().root();
         if table.used(PageId(0), frame).is_none() {
             list.pieces.extend(self.free.pop());
-            return draw_root(input, self.tint, out, list);
+            return draw_root(input, root, self.tint, out, list);
         }
 
         let look = Look::new(&input.view, root, self.cutting, input.threshold_px);
@@ -209,7 +208,7 @@ impl SplatSelector {
         items.push(Item::root(root, look.known()));
         let cut = Cut {
             look,
-            table,
+            table: table.clone(),
             frame,
             max_nodes: root.nodes,
             tint: self.tint,
@@ -243,7 +242,7 @@ impl SplatSelector {
         list.pieces.extend(self.filled.drain(..).map(|(_, _, piece)| piece));
         sum_up(&mut self.wanted);
         out.requests.extend(self.wanted.iter().map(|(page, benefit)| PageRequest {
-            key: PageKey { file: input.file, page: *page },
+            key: PageKey { file: input.file, page: (*page).into() },
             benefit: *benefit as f32 / BENEFIT_UNITS,
         }));
         if input.interrupt.is_set() {
@@ -264,14 +263,13 @@ fn piece_splats(most_splats: u64) -> usize {
 }
 
 /// Nothing but the skeleton to draw from: the root ball.
-fn draw_root(input: &SelectInput<'_>, tint: Tint, out: &mut Selection, list: &mut SplatList) -> Outcome {
-    let root = input.residency.file(input.file).skeleton().root();
+fn draw_root(input: &SelectInput<'_>, root: &Root, tint: Tint, out: &mut Selection, list: &mut SplatList) -> Outcome {
     let [high, low] = input.view.eye_in_local(root.origin);
     let center = root.sphere.center - high - low;
     let radius = root.sphere.radius;
     let depth = center.dot(input.view.forward);
     let px = projected::diameter_px(depth, center.length_squared(), radius, input.view.focal_px);
-    let key = PageKey { file: input.file, page: PageId(0) };
+    let key = PageKey { file: input.file, page: PageId(0).into() };
     out.requests.push(PageRequest { key, benefit: px.min(MOST_BENEFIT_PX) });
     out.report.drew(px, Some(Limit::Residency));
     if list.pieces.is_empty() {

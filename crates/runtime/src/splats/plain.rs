@@ -100,9 +100,9 @@ struct Group {
 /// Cuts one hierarchy for one view.
 pub fn cut(input: &SelectInput<'_>, cutting: &Cutting, work: &mut Work, sink: &mut impl CutSink) -> CutReport {
     let residency = input.residency;
-    let file = residency.file(input.file).clone();
-    let root = file.skeleton().root();
     let mut report = CutReport { threshold_px: input.threshold_px, ..CutReport::default() };
+    let Some((file, ..)) = residency.splats(input.file) else { return report };
+    let root = file.skeleton().root();
     if residency.page(input.file, PageId(0)).is_none() {
         // Nothing but the skeleton to draw from: the root ball.
         let [high, low] = input.view.eye_in_local(root.origin);

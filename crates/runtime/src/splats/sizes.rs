@@ -1,6 +1,6 @@
 //! Which threshold a number of splats allows.
 //!
-//! In: hierarchies as they are resident, a threshold, a number. Out: the threshold, or the next steps above it, at which no more
+//! In: hierarchies of either kind as they are resident, a threshold, a number. Out: the threshold, or the next steps above it, at which no more
 //! splats are drawn than that.
 //! What always holds: the answer depends on nothing else, neither on threads nor on earlier answers.
 //!
@@ -14,7 +14,7 @@ use super::lanes::Look;
 use super::walk::CHECK_GROUPS;
 use crate::fineness::Interrupt;
 use crate::residency::PageTable;
-use gigalod_format::splats::Root;
+use gigalod_format::splats::{Page, Root};
 
 /// Steps of the threshold: 16 in each octave, between 2⁻²⁰ and 2³² pixels.
 const STEPS: usize = 52 << STEP_BITS;
@@ -42,11 +42,11 @@ pub(crate) fn coarser(px: f32) -> f32 {
 pub(crate) struct ThresholdSearch {
     threshold_px: f32,
     most_splats: u64,
-    /// Nodes drawn, as long as the threshold has not been raised.
+    /// Splats, triangles and points drawn, as long as the threshold has not been raised.
     drawn: u64,
     /// First step above the threshold, once it was raised.
     raised: Option<usize>,
-    /// Splats at an infinite threshold.
+    /// The same at an infinite threshold.
     roots: i64,
     /// What groups add, by the step of their m.
     added: Box<[i64; STEPS]>,
@@ -89,21 +89,39 @@ impl ThresholdSearch {
     /// Counts a hierarchy of which nothing is resident.
     pub(super) fn count_root(&mut self) {
         self.drawn += 1;
-        self.roots += 1;
-        self.counted += 1;
+        self.add_root(1);
         self.raise_if_too_many();
+    }
+
+    /// What a hierarchy draws at an infinite threshold.
+    pub(crate) fn add_root(&mut self, primitives: u64) {
+        self.roots += primitives as i64;
+        self.counted += primitives as i64;
+    }
+
+    /// What is drawn at the threshold, as long as it has not been raised.
+    pub(crate) fn add_drawn(&mut self, primitives: u64) {
+        self.drawn += primitives;
+    }
+
+    /// What a node that is opened adds to every threshold below `least_px`, the smallest error of it and all that is above.
+    pub(crate) fn add(&mut self, least_px: f32, primitives: i64) {
+        let step = step(least_px);
+        self.added[step] += primitives;
+        if self.raised.is_some_and(|first| step >= first) {
+            self.counted += primitives;
+        }
     }
 
     /// Counts a hierarchy. False where it was broken off.
     pub(super) fn count(
         &mut self,
         mut look: Look,
-        (table, frame): (&PageTable, u32),
+        (table, frame): (&PageTable<Page>, u32),
         root: &Root,
         interrupt: &Interrupt,
     ) -> bool {
-        self.roots += 1;
-        self.counted += 1;
+        self.add_root(1);
         let (mut visited, mut groups) = (0, 0u32);
         self.stack.clear();
         self.stack.push(Group::root(root, look.known()));
@@ -129,7 +147,7 @@ impl ThresholdSearch {
     }
 
     #[inline(always)]
-    fn visit(&mut self, look: &Look, table: &PageTable, frame: u32, group: &Group) -> Result<(), Inconsistent> {
+    fn visit(&mut self, look: &Look, table: &PageTable<Page>, frame: u32, group: &Group) -> Result<(), Inconsistent> {
         let stored = Stored::read(table, group)?;
         let decided = look.decide(group.parent, group.known, &stored.words, group.count);
         let mut open = decided.coarse & stored.inner();
@@ -140,17 +158,12 @@ impl ThresholdSearch {
             }
         }
         self.drawn += ones(decided.seen & !open & !decided.hidden);
-        let adds = ones(decided.seen) as i64 - 1;
-        let step = step(group.least_px);
-        self.added[step] += adds;
-        if self.raised.is_some_and(|first| step >= first) {
-            self.counted += adds;
-        }
+        self.add(group.least_px, ones(decided.seen) as i64 - 1);
         Ok(())
     }
 
     /// Goes up to the first step at which what was counted is not too much, if it is too much.
-    fn raise_if_too_many(&mut self) -> bool {
+    pub(crate) fn raise_if_too_many(&mut self) -> bool {
         let most = i64::try_from(self.most_splats).unwrap_or(i64::MAX);
         let too_many = if self.raised.is_some() { self.counted > most } else { self.drawn > self.most_splats };
         if !too_many {

@@ -12,7 +12,7 @@ use super::list::{SplatBall, SplatList, SplatPiece};
 use crate::fineness::Interrupt;
 use crate::residency::PageTable;
 use crate::{CutReport, Limit};
-use gigalod_format::splats::{Node, PageId, Root};
+use gigalod_format::splats::{Node, Page, PageId, Root};
 use glam::Vec4;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,7 +41,7 @@ pub(super) struct Item {
 #[derive(Debug)]
 pub(super) struct Cut {
     pub(super) look: Look,
-    pub(super) table: Arc<PageTable>,
+    pub(super) table: Arc<PageTable<Page>>,
     /// What pages are marked with.
     pub(super) frame: u32,
     pub(super) max_nodes: u64,
@@ -284,6 +284,7 @@ impl Worker {
     fn flush(&mut self, cut: &Cut, chunk: u32) {
         let filled = std::mem::take(&mut self.filled);
         self.report.drawn += filled as u64;
+        self.report.points += filled as u64;
         if cut.drawn.fetch_add(filled as u64, Relaxed) + filled as u64 > cut.most_splats {
             cut.stop.store(true, Relaxed);
             return;
@@ -378,7 +379,7 @@ mod tests {
         let root = *file.skeleton().root();
         let mut residency = Residency::new(1 << 30, Box::<InlineLoader>::default());
         let id = residency.add(file.clone());
-        let key = |page| crate::PageKey { file: id, page: PageId(page) };
+        let key = |page| crate::PageKey { file: id, page: crate::PageNumber(page) };
         let all: Vec<_> = (0..file.skeleton().pages().len() as u32)
             .map(|page| crate::PageRequest { key: key(page), benefit: 1.0 })
             .collect();
@@ -392,7 +393,8 @@ mod tests {
         let cutting = Cutting { frustum_culling: false, backface_culling: false };
         let look = Look::new(&view, &root, cutting, 0.0);
         let interrupt = Interrupt::default();
-        let (table, frame) = residency.table(id);
+        let (_, table, frame) = residency.splats(id).unwrap();
+        let table = table.clone();
         let cut = Cut {
             look,
             table,

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 pub(crate) mod judge;
+pub(crate) mod octree;
 
 use gigalod_build::{NoProgress, Options, splats};
 use gigalod_format::splats::SplatFile;

@@ -55,7 +55,7 @@ impl Viewer {
     /// Around all models; world space.
     pub(crate) fn bounds(&self) -> Aabb {
         let corners = self.models.iter().flat_map(|Staged { model, .. }| {
-            let corners = model.file.skeleton().root().bounds.corners();
+            let corners = model.file.bounds().corners();
             let place = move |at: &gigalod_runtime::Similarity| {
                 let at = *at;
                 corners.map(|corner| at.position + at.rotation * (corner * at.scale))
