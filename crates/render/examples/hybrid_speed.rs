@@ -69,11 +69,11 @@ fn main() {
     let mut renderer = Gpu::open().and_then(Renderer::new).expect("there is an adapter");
     println!("{}", renderer.gpu().adapter());
     let extents: Vec<u32> = std::env::args().skip(1).map(|text| text.parse().expect("an extent in pixels")).collect();
-    let extents = if extents.is_empty() { vec![8, 16, 32, 60] } else { extents };
+    let extents = if extents.is_empty() { vec![16, 60] } else { extents };
     let empty = seconds(&mut renderer, &[]);
     println!("nothing: {:.1} ms", empty * 1e3);
     for (leg_px, layer_count) in
-        [(0.5, 1), (1.0, 1), (2.0, 3), (4.0, 6), (10.0, 12), (20.0, 12), (50.0, 12), (200.0, 12)]
+        [(720.0, 1), (0.5, 1), (1.0, 1), (2.0, 3), (4.0, 6), (10.0, 12), (20.0, 12), (50.0, 12), (200.0, 12)]
     {
         let soup = layers(leg_px, layer_count);
         let model = soup.model(&Grid::around(&soup), 24, Extra::default());

@@ -31,8 +31,8 @@ pub enum RenderError {
         /// Bytes allowed.
         budget: u64,
     },
-    /// More splats than 32-bit numbers can name.
-    #[error("{0} splats in a frame, expected fewer than 4294967295")]
+    /// More splats or primitives than 32-bit numbers can name, or more vertices in a page than 21-bit numbers.
+    #[error("{0} splats, primitives or vertices of a page: more than can be numbered")]
     TooMany(u64),
     /// Triangles are drawn through storage buffers, and this device cannot write any.
     #[error("the graphics device cannot draw hybrid models: it has no storage buffers to write to")]

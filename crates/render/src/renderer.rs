@@ -4,23 +4,23 @@
 //! is within the budget; a frame like the last one creates no buffer and no texture; after any error the renderer can be used
 //! again, at the latest after [`Renderer::recover`].
 
+mod capacity;
+
 use crate::buffers::Buffers;
 use crate::commands::Commands;
 use crate::frame::{Frame, Lists};
 use crate::hybrid;
 use crate::hybrid::arena::{self, Arena};
-use crate::hybrid::keyed::{HybridBuffers, HybridFrame, HybridPass};
+use crate::hybrid::keyed::{HybridFrame, HybridPass};
 use crate::light::LightPass;
 use crate::splats::Kernel;
 use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
 use crate::splats::keyed::{self, Bands, KeyedFrame, KeyedPass};
-use crate::splats::params::STRIDE;
 use crate::splats::pipelines::{Resolving, Round};
 use crate::splats::store::{self, Plan};
 use crate::staging::Staging;
 use crate::targets::Targets;
 use crate::{Gpu, GpuLevel, Picture, RenderError, gbuffer, memory};
-use gigalod_format::hybrid::NodeRecord;
 use gigalod_geom::ImageSize;
 use gigalod_runtime::Interrupt;
 
@@ -54,9 +54,6 @@ struct OnDevice {
     hybrid: hybrid::plan::Plan,
     hybrid_bands: Bands,
 }
-
-/// Parts that [`Renderer::most_splats`] leaves room for.
-const USUAL_PARTS: u64 = 256;
 
 impl Renderer {
     /// Compiles what every frame needs. Passes of a kernel are compiled when it is first drawn.
@@ -106,23 +103,6 @@ impl Renderer {
     /// Most bytes to take on the device from now on; `None` for no limit. What is kept beyond that is freed by the next frame.
     pub fn set_budget(&mut self, bytes: Option<u64>) {
         self.budget = bytes;
-    }
-
-    /// How many splats can be drawn into a picture of this size within the budget, and read back. 0 where there is no room for
-    /// the picture itself.
-    pub fn most_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
-        const NAMES: u64 = u32::MAX as u64 - 1;
-        let Some(budget) = self.budget else { return NAMES };
-        let room = budget.saturating_sub(self.bytes_without_primitives(size, kernel));
-        // Whole rows of textures, and the smallest slices; the list has room for one slice.
-        let listed = if self.gpu.level() > GpuLevel::WebGl { store::WIDTH * keyed::LISTED_BYTES } else { 0 };
-        let row = store::ROW_BYTES + (STRIDE * store::WIDTH).div_ceil(keyed::LEAST_IN_SLICE);
-        let in_list = keyed::MOST_IN_SLICE / store::WIDTH;
-        let rows = match room / (row + listed) {
-            rows if rows <= in_list => rows,
-            _ => (room - in_list * listed) / row,
-        };
-        (rows * store::WIDTH).min(NAMES)
     }
 
     /// Splats of at most this many pixels across and down are drawn by the compute pass, larger ones through the pipeline, and nodes'
@@ -252,7 +232,11 @@ impl Renderer {
         let hybrid = hybrid::plan::Plan::new(camera, &lists.hybrid, hybrid::plan::most_runs(&self.gpu))?;
         let hybrid_passes = hybrid::keyed::pass_bytes(&self.gpu, camera, &hybrid_bands, &hybrid, self.hybrid_extent_px);
         let pages = arena::needed_bytes(lists.hybrid.iter().map(|(_, list)| *list));
-        if hybrid.nodes > 0 {
+        let most_page_bytes = arena::most_bytes(&self.gpu);
+        if pages > most_page_bytes {
+            return Err(RenderError::Budget { needed: pages, budget: most_page_bytes });
+        }
+        if !hybrid.is_empty() {
             let Buffers { keyed, hybrid: buffers, .. } = &mut self.buffers;
             buffers.want(keyed, &self.gpu, &hybrid_bands, &hybrid, hybrid_passes.len() as u64)?;
         }
@@ -265,7 +249,7 @@ impl Renderer {
         }
         staging.write(gpu, buffers.passes.buffer(), 0, &passes)?;
         staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&plan.parts))?;
-        if hybrid.nodes > 0 {
+        if !hybrid.is_empty() {
             let nodes = hybrid::plan::Plan::node_params(camera, &lists.hybrid, arena);
             buffers.hybrid.send(gpu, staging, &nodes, &hybrid.runs, &hybrid_passes)?;
         }
@@ -302,7 +286,7 @@ impl Renderer {
             let splats = DepthTestFrame { kernel, plan, chunks, passes, parts };
             self.depth_test_pass.encode(gpu, commands.encoder(), gbuffer, &splats);
         }
-        if hybrid.nodes > 0 {
+        if !hybrid.is_empty() {
             self.hybrid_pass.prepare(gpu, hybrid);
             let Buffers { keyed: shared, hybrid: buffers, .. } = &*whole;
             let frame = HybridFrame { bands: *hybrid_bands, plan: hybrid, buffers, shared };
@@ -321,46 +305,6 @@ impl Renderer {
             self.light_pass.draw(&mut pass, &lit);
         }
         commands.submit().map(|()| true)
-    }
-
-    /// How a picture is cut up: what is kept for each of its pixels shall fit into a binding, and leave room for splats.
-    fn bands(&self, size: ImageSize, kernel: Kernel) -> Bands {
-        const LEAST_BYTES: u64 = 1 << 20;
-        let share = self.budget.map_or(u64::MAX, |budget| (budget / 8).max(LEAST_BYTES));
-        Bands::new(size, kernel, self.gpu.most_buffer_bytes().min(share))
-    }
-
-    /// Bytes of hybrid pages that can be drawn into a picture of this size within the budget, and read back; [`Renderer::page_bytes`]
-    /// says what a node's page takes. 0 where there is no room for the picture itself.
-    pub fn most_page_bytes(&self, size: ImageSize, kernel: Kernel) -> u64 {
-        let most = hybrid::keyed::most_page_bytes(&self.gpu);
-        let Some(budget) = self.budget else { return most };
-        let taken = self.bytes_without_primitives(size, kernel) + HybridBuffers::usual_bytes(&self.gpu);
-        // Whole rows of a texture.
-        (budget.saturating_sub(taken) / arena::ROW_BYTES * arena::ROW_BYTES).min(most)
-    }
-
-    /// How many triangles, points and lines that is, of usual models: half as many vertices as triangles.
-    pub fn most_primitives(&self, size: ImageSize, kernel: Kernel) -> u64 {
-        const USUAL_BYTES: u64 = 16;
-        self.most_page_bytes(size, kernel) / USUAL_BYTES
-    }
-
-    /// Bytes that the page of a hybrid node takes on the device.
-    pub fn page_bytes(record: &NodeRecord) -> u64 {
-        arena::page_bytes(record)
-    }
-
-    /// What a frame without a splat or a node takes.
-    fn bytes_without_primitives(&self, size: ImageSize, kernel: Kernel) -> u64 {
-        let mut buffers = Buffers::new();
-        let bands = self.bands(size, kernel);
-        if self.gpu.level() > GpuLevel::WebGl {
-            buffers.keyed.want(&bands, kernel, 0);
-        }
-        buffers.want_parts(STRIDE * USUAL_PARTS, USUAL_PARTS);
-        buffers.want_readback(size);
-        Staging::BYTES + Targets::bytes(size) + buffers.least_bytes()
     }
 
     /// Targets of this size, and buffers for a frame, of which all is wanted but the pages of nodes; within the budget, or with an

@@ -6,9 +6,13 @@ use common::octree::{CELL_BITS, Octree, RADIUS, leaves_below, open};
 use gigalod_format::hybrid::{NodeId, NodeRecord, Root};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Camera, ImageSize, projected};
+use gigalod_runtime::hybrid::CHECK_NODES;
 use gigalod_runtime::residency::InlineLoader;
 use gigalod_runtime::splats::Cutting;
-use gigalod_runtime::{CutReport, DrawSource, FileId, Fineness, Instance, Limit, Residency, Scene, Similarity, ViewId};
+use gigalod_runtime::{
+    CutReport, DrawSource, FileId, Fineness, HybridSelector, Instance, InstanceId, Interrupt, Limit, ModelView,
+    Outcome, Residency, Scene, SelectInput, Selection, Selector, Similarity, Target, ViewId,
+};
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -212,6 +216,31 @@ fn where_pages_are_missing_parents_are_drawn_and_children_requested_until_nothin
         }
     }
     assert!((4..=8).contains(&rounds), "a level a round: {rounds}");
+}
+
+#[test]
+fn what_is_interrupted_looks_at_few_more_nodes_and_keeps_no_pages() {
+    let octree = Octree::sphere(7, false);
+    let scene = all_resident(&octree);
+    let interrupt = Interrupt::default();
+    let input = SelectInput {
+        file: FileId(0),
+        view: ModelView::new(&camera(&scene, (0.0, 1.0)), &Similarity::IDENTITY),
+        threshold_px: 0.0,
+        most_splats: u64::MAX,
+        room_bytes: u64::MAX,
+        interrupt: &interrupt,
+        residency: scene.residency(),
+    };
+    let target = Target { instance: InstanceId(7), view: VIEW };
+    let (mut selector, mut selection) = (HybridSelector::default(), Selection::default());
+    assert_eq!(selector.select(target, &input, &mut selection), Outcome::Complete);
+    assert!(selection.report.visited > 4 * CHECK_NODES);
+    interrupt.set();
+    assert_eq!(selector.select(target, &input, &mut selection), Outcome::Interrupted);
+    assert!(selection.report.visited <= CHECK_NODES + 8, "{:?}", selection.report);
+    let DrawSource::Hybrid(list) = &selection.draw else { panic!("{:?}", selection.draw) };
+    assert!(list.nodes.is_empty());
 }
 
 #[test]

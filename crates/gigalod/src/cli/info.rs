@@ -8,7 +8,7 @@ use super::progress::Console;
 use gigalod_format::{Bounds, Dicing, InputCounts, LevelSummary, ReferenceSystem};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 
 /// The JSON object of `info`.
 #[derive(Serialize)]
@@ -84,12 +84,14 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
         repeated => format!(", {repeated} of them repeated: isolated ones, to be as small as they are"),
     };
     line("leaves", format!("{}{repeated}", metadata.leaves));
-    let per_leaf = |bytes: u64| bytes as f64 / metadata.leaves.max(1) as f64;
-    line("size", format!("{} ({:.2} bytes a leaf)", readable_bytes(bytes), per_leaf(bytes)));
-    line(
-        "raw size",
-        format!("{} ({:.2} bytes a leaf)", readable_bytes(metadata.raw_bytes), per_leaf(metadata.raw_bytes)),
-    );
+    // A leaf of splats is a vertex or point; one of a hybrid file holds thousands of triangles.
+    let is_hybrid = model.hybrid().is_some();
+    let (things, thing) =
+        if is_hybrid { (metadata.input.triangles, "an input triangle") } else { (metadata.leaves, "a leaf") };
+    let size =
+        |bytes: u64| format!("{} ({:.2} bytes {thing})", readable_bytes(bytes), bytes as f64 / things.max(1) as f64);
+    line("size", size(bytes));
+    line("raw size", size(metadata.raw_bytes));
     line("attributes", metadata.attributes.join(", "));
     line("closed", if metadata.closed { "yes: backs are hidden" } else { "no: drawn from both sides" }.into());
     let unit = json.units.map(shown).unwrap_or_default();
@@ -101,9 +103,16 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
         line("system", [name.clone(), number, text].into_iter().flatten().collect::<Vec<_>>().join("; "));
     }
     let error = if unit.is_empty() { "max error".to_owned() } else { format!("max error/{unit}") };
-    let _ = writeln!(text, "\n{:>5} {:>12} {:>12} {error:>14}", "level", "nodes", "bytes");
-    for level in &metadata.per_level {
-        let _ = writeln!(text, "{:>5} {:>12} {:>12} {:>14.6e}", level.level, level.nodes, level.bytes, level.max_error);
+    // Splats are points and nothing else, one a node.
+    let payload = |triangles: &dyn Display, points: &dyn Display| match is_hybrid {
+        true => format!(" {triangles:>12} {points:>12}"),
+        false => String::new(),
+    };
+    let names = payload(&"triangles", &"points");
+    let _ = writeln!(text, "\n{:>5} {:>12}{names} {:>12} {error:>14}", "level", "nodes", "bytes");
+    for LevelSummary { level, nodes, triangles, points, bytes, max_error } in &metadata.per_level {
+        let payload = payload(triangles, points);
+        let _ = writeln!(text, "{level:>5} {nodes:>12}{payload} {bytes:>12} {max_error:>14.6e}");
     }
     Ok(Outcome::new(&json, text))
 }

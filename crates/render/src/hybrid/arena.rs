@@ -67,13 +67,18 @@ fn key(list: &HybridList, node: &HybridNode) -> Key {
     (list.file.0, node.node.0)
 }
 
+/// Bytes that pages of a frame may have: those of one texture.
+pub(crate) fn most_bytes(gpu: &Gpu) -> u64 {
+    u64::from(gpu.max_picture_edge()) * ROW_BYTES
+}
+
 /// Bytes to ask for, best first: while there are pages, room for those of later frames too.
 pub(crate) fn wishes(gpu: &Gpu, needed: u64, held: u64) -> Vec<u64> {
+    const MOST_MORE: u64 = 32 << 20;
     if needed == 0 {
         return vec![0];
     }
-    let most = u64::from(gpu.max_picture_edge()) * ROW_BYTES;
-    let larger = if needed <= held { held } else { (needed * 2).max(held).min(most) };
+    let larger = if needed <= held { held } else { (needed + needed.min(MOST_MORE)).min(most_bytes(gpu)) };
     vec![larger.max(needed), needed]
 }
 
@@ -83,7 +88,8 @@ pub(crate) fn needed_bytes<'a>(lists: impl Iterator<Item = &'a HybridList>) -> u
     for list in lists {
         pages.extend(list.nodes.iter().map(|node| (key(list, node), texels(&node.page))));
     }
-    pages.values().sum::<u64>() * TEXEL_BYTES
+    // A texture has a texel at least.
+    pages.values().sum::<u64>().max(u64::from(!pages.is_empty())) * TEXEL_BYTES
 }
 
 impl Arena {

@@ -5,13 +5,12 @@
 
 use crate::commands::Commands;
 use crate::gbuffer::GBuffer;
-use crate::hybrid::arena;
 use crate::hybrid::params::{HybridParams, NODE_TEXELS, NodeParams, RUN_LOG2};
 use crate::hybrid::pipelines::{Pipelines, Resolving};
 use crate::hybrid::plan::{Plan, RunParams, Slice, most_runs};
 use crate::memory::Pool;
 use crate::splats::Kernel;
-use crate::splats::keyed::{Bands, KeyedBuffers, LISTED_BYTES};
+use crate::splats::keyed::{Bands, KeyedBuffers, LISTED_BYTES, MOST_COMPUTE_EXTENT_PX};
 use crate::splats::params::STRIDE;
 use crate::splats::store::WIDTH;
 use crate::staging::Staging;
@@ -19,9 +18,10 @@ use crate::{Gpu, RenderError};
 use gigalod_geom::Camera;
 
 /// What is at most so many pixels wide and high is drawn by single invocations, unless
-/// [`crate::Renderer::set_compute_extent`] says otherwise.
+/// [`crate::Renderer::set_compute_extent`] says otherwise. Measured on the software adapter (`examples/hybrid_speed.rs`): beginning a
+/// workgroup for a triangle takes it as long as an invocation takes for thousands of pixels.
 pub(crate) fn compute_extent_px(gpu: &Gpu) -> u32 {
-    if gpu.is_software() { 16 } else { 16 }
+    if gpu.is_software() { MOST_COMPUTE_EXTENT_PX } else { 16 }
 }
 
 /// Bytes of what a draw of large primitives begins with: workgroups in three directions, and how many primitives.
@@ -195,9 +195,13 @@ impl HybridPass {
             frame.shared.find(commands.encoder(), keys_bytes);
             let mut pass = gbuffer.begin(commands.encoder(), false);
             pass.set_pipeline(pipelines.resolve(resolving(frame.plan)));
-            pass.set_scissor_rect(0, rows.start, gbuffer.size.width, rows.end - rows.start);
-            pass.set_bind_group(0, &bound[2], &[offset(band, 0, 0)]);
-            pass.draw(0..3, 0..1);
+            let [columns, in_picture] = &frame.plan.window;
+            let (first, end) = (rows.start.max(in_picture.start), rows.end.min(in_picture.end));
+            if columns.start < columns.end && first < end {
+                pass.set_scissor_rect(columns.start, first, columns.end - columns.start, end - first);
+                pass.set_bind_group(0, &bound[2], &[offset(band, 0, 0)]);
+                pass.draw(0..3, 0..1);
+            }
         }
         Ok(true)
     }
@@ -250,9 +254,4 @@ fn bind(gpu: &Gpu, pipelines: &Pipelines, frame: &HybridFrame<'_>) -> [wgpu::Bin
         .collect::<Vec<_>>()
         .try_into()
         .expect("one for each pass")
-}
-
-/// Bytes that pages of a frame may have at most in one texture.
-pub(crate) fn most_page_bytes(gpu: &Gpu) -> u64 {
-    u64::from(gpu.max_picture_edge()) * arena::ROW_BYTES
 }

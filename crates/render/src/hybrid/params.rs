@@ -4,7 +4,7 @@ use crate::splats::params::NEAR;
 use gigalod_format::hybrid::{NodeRecord, Skeleton};
 use gigalod_geom::Camera;
 use gigalod_runtime::{ModelView, Similarity};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Primitives in a run, as a power of two; `RUN_LOG2` of hybrid_store.wgsl.
 pub(crate) const RUN_LOG2: u32 = 10;
@@ -138,12 +138,39 @@ impl<'a> Seen<'a> {
         }
     }
 
+    /// Smallest corner and extent of a node, model space.
+    fn bounds(&self, record: &NodeRecord) -> [DVec3; 2] {
+        let step = self.skeleton.step(record.level);
+        let low = self.skeleton.root().origin + DVec3::from_array(record.min_steps.map(f64::from)) * step;
+        [low, DVec3::from_array(record.extent_steps.map(f64::from)) * step]
+    }
+
+    /// Where in the picture a node may show: smallest and largest place, in pixels; everywhere if it reaches the plane of the eye.
+    pub(crate) fn window_px(&self, record: &NodeRecord) -> [DVec2; 2] {
+        let [low, extent] = self.bounds(record);
+        let camera = &self.view.camera;
+        // Points and lines stick out.
+        let margin = f64::from(record.spacing) + f64::from(record.error_geo);
+        let mut window = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        for corner in 0..8u32 {
+            let part = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
+            let view = camera.view_point(low - margin + (extent + 2.0 * margin) * part);
+            // Written so that what is no number is everywhere.
+            let is_before_eye = view.z > margin * 1e-3;
+            if !is_before_eye {
+                return [DVec2::NEG_INFINITY, DVec2::INFINITY];
+            }
+            let px = camera.pixel_of_view_point(view);
+            window = [window[0].min(px), window[1].max(px)];
+        }
+        // Points are a pixel wide, and places are rounded.
+        [window[0] - 2.0, window[1] + 2.0]
+    }
+
     /// Half the largest width in pixels of lines of a node.
     pub(crate) fn line_half_px(&self, record: &NodeRecord) -> f64 {
-        let step = self.skeleton.step(record.level);
+        let [low, extent] = self.bounds(record);
         let camera = &self.view.camera;
-        let low = self.skeleton.root().origin + DVec3::from_array(record.min_steps.map(f64::from)) * step;
-        let extent = DVec3::from_array(record.extent_steps.map(f64::from)) * step;
         // Depth of the box's nearest corner.
         let forward = camera.forward;
         let depth = (low - camera.eye).dot(forward) + (extent * forward.min(DVec3::ZERO)).element_sum();

@@ -11,6 +11,7 @@ use gigalod_geom::Camera;
 use gigalod_runtime::Similarity;
 use gigalod_runtime::hybrid::HybridList;
 use gigalod_runtime::splats::{MATERIAL_SRGB, Tint, level_color};
+use glam::DVec2;
 use std::ops::Range;
 
 /// Kinds of primitives, as in `hybrid_kinds.wgsl`.
@@ -52,6 +53,8 @@ pub(crate) struct Plan {
     pub(crate) nodes: u32,
     /// Some vertices have colours.
     pub(crate) has_colors: bool,
+    /// Columns and rows that may show something: to look up what shows takes the software adapter as long where nothing does.
+    pub(crate) window: [Range<u32>; 2],
 }
 
 /// Lists that hold something, with their files.
@@ -62,7 +65,7 @@ fn filled<'a>(
 }
 
 fn points(page: &Page, vertices: u32) -> u32 {
-    page.positions.len() as u32 - vertices
+    (page.positions.len() as u32).saturating_sub(vertices)
 }
 
 impl Plan {
@@ -78,6 +81,7 @@ impl Plan {
         let mut plan = Self::default();
         let mut by_kind: [Vec<RunParams>; 3] = Default::default();
         let mut total = 0u64;
+        let mut shown = [DVec2::INFINITY, DVec2::NEG_INFINITY];
         for (placement, list, file) in filled(lists) {
             let skeleton = file.skeleton();
             let seen = Seen::new(camera, placement, skeleton);
@@ -100,6 +104,8 @@ impl Plan {
                         runs.push([plan.nodes, first | (in_run - 1)]);
                     }
                 }
+                let of_node = seen.window_px(record);
+                shown = [shown[0].min(of_node[0]), shown[1].max(of_node[1])];
                 plan.nodes += 1;
                 total += counts.map(u64::from).iter().sum::<u64>();
             }
@@ -107,6 +113,9 @@ impl Plan {
         if by_kind.iter().map(Vec::len).sum::<usize>() as u64 > MOST_RUNS {
             return Err(RenderError::TooMany(total));
         }
+        let columns = shown[0].x as u32..(shown[1].x.ceil() as u32).min(camera.size.width);
+        let rows = shown[0].y as u32..(shown[1].y.ceil() as u32).min(camera.size.height);
+        plan.window = [columns, rows];
         for (kind, runs) in Kind::ALL.into_iter().zip(&by_kind) {
             let first = plan.runs.len() as u32;
             if kind > Kind::Triangles {
@@ -118,6 +127,11 @@ impl Plan {
             plan.slices.extend(starts.map(|start| Slice { kind, runs: start..end.min(start + most_runs) }));
         }
         Ok(plan)
+    }
+
+    /// True where there is nothing to draw.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.slices.is_empty()
     }
 
     /// True where there are points or lines.

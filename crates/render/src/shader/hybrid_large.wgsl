@@ -159,24 +159,25 @@ fn draw_triangle(node: Node, index: u32, number: u32, share: u32, shares: u32, i
     var b = vertex_of(node, corners.y);
     var c = vertex_of(node, corners.z);
     let is_tame = a.tame && b.tame && c.tame;
-    // Its plane, through edges that are exact, and where the eye is.
-    let from_a = vec3i(position_of(node, corners.x));
-    let to_b = in_view(node, vec3f(vec3i(position_of(node, corners.y)) - from_a));
-    let to_c = in_view(node, vec3f(vec3i(position_of(node, corners.z)) - from_a));
-    let normal = vec3f(
+    // Its plane in whole steps, so that nothing is lost where it lies along an axis, however near the eye is; then in view.
+    let first = vec3i(position_of(node, corners.x));
+    let to_b = vec3f(vec3i(position_of(node, corners.y)) - first);
+    let to_c = vec3f(vec3i(position_of(node, corners.z)) - first);
+    let across = vec3f(
         to_b.y * to_c.z - to_b.z * to_c.y,
         to_b.z * to_c.x - to_b.x * to_c.z,
         to_b.x * to_c.y - to_b.y * to_c.x,
     );
-    let eye_off = dot3(normal, a.in_view);
+    let eye_off = dot3(across, vec3f(node.offset + first) + node.to_eye);
+    let normal = in_view(node, across) * (1.0 / dot3(node.right, node.right));
     let area = cross_wide(b.at - a.at, c.at - a.at);
-    let is_turned = select(eye_off > 0.0, area.high < 0i, is_tame);
+    let is_turned = select(eye_off < 0.0, area.high < 0i, is_tame);
     if select(eye_off == 0.0, (area.high | area.low) == 0i, is_tame) {
         return;
     }
     let flat = flat_of(a, b, c, is_turned);
     let turned_area = cross_wide(flat.b - flat.a, flat.c - flat.a);
-    let per_area = 1.0 / float_of(turned_area);
+    let whole = float_of(turned_area);
     if is_turned {
         let third = c;
         c = b;
@@ -211,7 +212,7 @@ fn draw_triangle(node: Node, index: u32, number: u32, share: u32, shares: u32, i
             let side_bc = side_of(bc, center, ray);
             let side_ca = side_of(ca, center, ray);
             let is_inside = side_ab.is_inside && side_bc.is_inside && side_ca.is_inside;
-            var z = depth_in(flat, side_ca.area, side_ab.area, per_area);
+            var z = depth_in(flat, vec3f(side_bc.area, side_ca.area, side_ab.area), whole);
             if !is_tame {
                 z = max(eye_off * (1.0 / dot3(normal, ray)), frame.near);
             }

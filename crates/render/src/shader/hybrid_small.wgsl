@@ -105,7 +105,7 @@ fn draw_triangle(node: Node, index: u32, number: u32) -> bool {
         return true;
     }
     let flat = flat_of(a, b, c, area < 0i);
-    let per_area = 1.0 / f32(abs(area));
+    let whole = f32(abs(area));
     let ab = flat.b - flat.a;
     let bc = flat.c - flat.b;
     let ca = flat.a - flat.c;
@@ -123,7 +123,7 @@ fn draw_triangle(node: Node, index: u32, number: u32) -> bool {
     var pixel = window.xy;
     loop {
         if (at.x | at.y | at.z) >= 0i {
-            let z = depth_in(flat, f32(at.z - off.z), f32(at.x - off.x), per_area);
+            let z = depth_in(flat, vec3f((at - off).yzx), whole);
             deliver(key_of(pixel), Meeting(z), Splat(number));
         }
         pixel.x++;

@@ -8,7 +8,7 @@ struct Flat {
     a: vec2i,
     b: vec2i,
     c: vec2i,
-    // 1 / z of the first, and what the others have more.
+    // 1 / z of each.
     per_z: vec3f,
 }
 
@@ -18,9 +18,7 @@ fn flat_of(a: Vertex, b: Vertex, c: Vertex, is_turned: bool) -> Flat {
     out.a = a.at;
     out.b = select(b.at, c.at, is_turned);
     out.c = select(c.at, b.at, is_turned);
-    let of_b = select(b.per_z, c.per_z, is_turned);
-    let of_c = select(c.per_z, b.per_z, is_turned);
-    out.per_z = vec3f(a.per_z, of_b - a.per_z, of_c - a.per_z);
+    out.per_z = vec3f(a.per_z, select(b.per_z, c.per_z, is_turned), select(c.per_z, b.per_z, is_turned));
     return out;
 }
 
@@ -29,8 +27,8 @@ fn owns(edge: vec2i) -> bool {
     return edge.y < 0i || (edge.y == 0i && edge.x > 0i);
 }
 
-// `of_b` and `of_c`: twice the areas across from these corners, and `per_area` the inverse of that of the triangle.
-fn depth_in(flat: Flat, of_b: f32, of_c: f32, per_area: f32) -> f32 {
-    let per_z = flat.per_z.x + (of_b * per_area) * flat.per_z.y + (of_c * per_area) * flat.per_z.z;
-    return 1.0 / per_z;
+// `shares`: twice the areas that a pixel's centre makes with the edges across from each corner, and `area` that of the triangle. A sum
+// of what is positive: nothing cancels, however near one corner is and however far another.
+fn depth_in(flat: Flat, shares: vec3f, area: f32) -> f32 {
+    return area * (1.0 / dot3(shares, flat.per_z));
 }

@@ -85,6 +85,9 @@ impl Grid {
     }
 }
 
+/// Triangles, and vertices without any.
+type Cell = (Vec<[u32; 3]>, Vec<u32>);
+
 impl Soup {
     /// As the judge sees it: on the grid, with coded normals.
     pub(crate) fn mesh(&self, grid: &Grid) -> Mesh {
@@ -98,7 +101,7 @@ impl Soup {
     pub(crate) fn model(&self, grid: &Grid, cells: u32, extra: Extra) -> Model {
         let cell_of =
             |p: DVec3| ((p - grid.origin) / grid.edge * f64::from(cells)).floor().to_array().map(|x| x as i32);
-        let mut by_cell: BTreeMap<[i32; 3], (Vec<[u32; 3]>, Vec<u32>)> = BTreeMap::new();
+        let mut by_cell: BTreeMap<[i32; 3], Cell> = BTreeMap::new();
         let mut is_used = vec![false; self.positions.len()];
         for triangle in &self.triangles {
             let middle = triangle.iter().map(|v| self.positions[*v as usize]).sum::<DVec3>() / 3.0;

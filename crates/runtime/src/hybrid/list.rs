@@ -54,7 +54,10 @@ impl HybridList {
 /// Equal are lists of the same nodes of the same model, drawn alike.
 impl PartialEq for HybridList {
     fn eq(&self, other: &Self) -> bool {
-        let names = |list: &'_ Self| list.nodes.iter().map(|node| (node.node, node.draws_lines)).collect::<Vec<_>>();
-        self.file == other.file && self.tint == other.tint && names(self) == names(other)
+        let is_same = |(a, b): (&HybridNode, &HybridNode)| a.node == b.node && a.draws_lines == b.draws_lines;
+        self.file == other.file
+            && self.tint == other.tint
+            && self.nodes.len() == other.nodes.len()
+            && self.nodes.iter().zip(&other.nodes).all(is_same)
     }
 }

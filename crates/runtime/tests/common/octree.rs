@@ -1,7 +1,7 @@
 //! Hybrid files made up in memory: a sphere's surface in an octree, uneven, with errors, cones and pages that fit.
 
 use gigalod_format::hybrid::{HybridFile, NodeId, NodeRecord, Page, Root, Skeleton};
-use gigalod_format::{Bounds, Container, InputCounts, Kind, MemoryStore, Metadata, Writer};
+use gigalod_format::{Bounds, Container, InputCounts, Kind, LevelSummary, MemoryStore, Metadata, Writer};
 use gigalod_geom::Aabb;
 use gigalod_geom::camera::UpAxis;
 use glam::{DVec3, IVec3};
@@ -76,7 +76,7 @@ impl Octree {
         let skeleton = Skeleton::encode(&self.root, &records);
         let metadata = Metadata {
             generator: "test".into(),
-            input: InputCounts::default(),
+            input: InputCounts { triangles: 1000, vertices: 500, points: 0 },
             options: Default::default(),
             nodes: self.root.nodes,
             levels: self.root.levels,
@@ -88,13 +88,25 @@ impl Octree {
             reference_system: None,
             attributes: Vec::new(),
             dicing: None,
-            per_level: Vec::new(),
+            per_level: (0..self.root.levels).map(|level| self.summary(level)).collect(),
         };
         let mut out = Cursor::new(Vec::new());
         let mut writer = Writer::new(&mut out, Kind::Hybrid, skeleton.len() as u64).unwrap();
         pages.iter().for_each(|page| writer.page(page).unwrap());
         writer.finish(&skeleton, &metadata).unwrap();
         out.into_inner()
+    }
+
+    fn summary(&self, level: u32) -> LevelSummary {
+        let of_level = || self.records.iter().zip(&self.pages).filter(|(record, _)| record.level == level);
+        LevelSummary {
+            level,
+            nodes: of_level().count() as u64,
+            triangles: of_level().map(|(record, _)| u64::from(record.triangles)).sum(),
+            points: of_level().map(|(record, _)| u64::from(record.points)).sum(),
+            bytes: of_level().map(|(_, page)| page.encode().len() as u64).sum(),
+            max_error: of_level().map(|(record, _)| f64::from(record.error_geo)).fold(0.0, f64::max),
+        }
     }
 
     /// Open.
