@@ -36,4 +36,5 @@ pub use host::{Entry, Folder, Host, Kind, Model, Opened, OpenedScene, Preview, P
 pub use mailbox::Figures;
 pub use report::{Measured, Report, Tally, percentile};
 pub use settings::{FirstLook, Options, Settings};
+pub use viewer::next_name;
 pub use window::{ViewError, run};

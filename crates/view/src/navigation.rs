@@ -161,6 +161,13 @@ impl Navigation {
         }
     }
 
+    /// Looks at a part of what there is, from the side that it was seen from.
+    pub fn look_at(&mut self, bounds: Aabb, size: ImageSize) {
+        let one = Self::new(bounds, self.up_axis, self.fov_y_rad, size);
+        self.pose = Pose { pivot: one.home.pivot, distance: one.fit, ..self.pose };
+        self.keep(size);
+    }
+
     /// Goes on with bounds that hardly differ, as of a model in place of its preview; home is around them.
     pub fn set_bounds(&mut self, bounds: Aabb, size: ImageSize) {
         let anew = Self::new(bounds, self.up_axis, self.fov_y_rad, size);

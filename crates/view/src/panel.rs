@@ -1,7 +1,7 @@
 //! The panel: what can be chosen, and what is going on.
 
 use crate::mailbox::ModelKey;
-use crate::measure::digits;
+use crate::measure::{digits, length};
 use crate::navigation::Input;
 use crate::viewer::{Staged, Viewer};
 use egui::{CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, vec2};
@@ -42,7 +42,7 @@ impl Viewer {
             }
             ui.toggle_value(&mut self.shows_help, "Keys (F1)");
         });
-        let mut removed: Option<ModelKey> = None;
+        let (mut removed, mut looked_at): (Option<ModelKey>, Option<ModelKey>) = (None, None);
         for Staged { key, model, preview } in &self.models {
             ui.horizontal(|ui| {
                 if ui.small_button("x").on_hover_text("Take this model away").clicked() {
@@ -54,8 +54,14 @@ impl Viewer {
                     Some((_, points)) => format!("{name}, a preview of {} points", count(*points)),
                     None => format!("{name}, {} splats", count(leaves)),
                 };
-                ui.add(egui::Label::new(text).truncate()).on_hover_text(model.source.display().to_string());
+                let name = ui.add(egui::Label::new(text).truncate().sense(Sense::click()));
+                if name.on_hover_text(format!("{}\nClick to look at it", model.source.display())).clicked() {
+                    looked_at = Some(*key);
+                }
             });
+        }
+        if let Some(key) = looked_at {
+            self.look_at(key);
         }
         if let Some(key) = removed {
             self.remove(key);
@@ -216,7 +222,10 @@ impl Viewer {
         painter.hline(rect.x_range(), y(target), Stroke::new(1.0, ui.visuals().weak_text_color()));
         let label = format!("{most:.0} ms");
         let font = egui::FontId::proportional(10.0);
-        painter.text(rect.left_top() + vec2(3.0, 2.0), egui::Align2::LEFT_TOP, label, font, ui.visuals().text_color());
+        let galley = painter.layout_no_wrap(label, font, ui.visuals().text_color());
+        let at = egui::Rect::from_min_size(rect.left_top() + vec2(3.0, 2.0), galley.size());
+        painter.rect_filled(at.expand(2.0), 2.0, ui.visuals().extreme_bg_color);
+        painter.galley(at.min, galley, ui.visuals().text_color());
     }
 
     fn measure_section(&mut self, ui: &mut Ui) {
@@ -236,11 +245,11 @@ impl Viewer {
             ui.weak("Click two points of the surface.");
         }
         if let Some((distance, uncertain, to_come)) = self.measuring.distance() {
-            ui.strong(format!("Distance {}", digits(distance, uncertain)));
+            ui.strong(format!("Distance {}", length(distance, uncertain, self.unit())));
             if to_come {
-                ui.weak(format!("± {uncertain:.2e}; reading the original"));
+                ui.weak("reading the original");
             } else if uncertain > 0.0 {
-                ui.weak(format!("± {uncertain:.2e}, from the splats"));
+                ui.weak("from the splats, as the original is not at hand");
             } else {
                 ui.weak("exact, from the original");
             }

@@ -13,6 +13,7 @@ mod names;
 mod notices;
 
 pub(crate) use names::Names;
+pub use names::next_name;
 pub(crate) use notices::Notice;
 
 use crate::host::{Folder, Host, Model};
@@ -125,7 +126,7 @@ impl Viewer {
             frame_times: std::collections::VecDeque::new(),
             names: Names::default(),
             shows_help: false,
-            shows_panel: true,
+            shows_panel: options.size.width > 2 * panel::WIDTH as u32,
             flies: false,
             under_cursor: None,
             zoom_to_come: None,
@@ -140,6 +141,9 @@ impl Viewer {
             told_problems: Vec::new(),
             tally: Tally::default(),
         };
+        if !viewer.shows_panel {
+            viewer.notice("F2 shows the panel", 0.0);
+        }
         options.files.iter().for_each(|file| viewer.open(file));
         viewer
     }

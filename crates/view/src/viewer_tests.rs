@@ -2,6 +2,7 @@
 
 use crate::host::{Entry, Folder, Host, Kind, Model, Opened, Preview, Work};
 use crate::mailbox::{Figures, Mailbox, Order};
+use crate::navigation::Input;
 use crate::pick::{Hit, Ray};
 use crate::picker;
 use crate::settings::{FirstLook, Options, Settings};
@@ -36,9 +37,9 @@ struct Files {
 }
 
 impl Files {
-    fn wrote(&self, path: &Path, what: String) -> Result<(), String> {
+    fn wrote(&self, path: &Path, what: String) -> Result<PathBuf, String> {
         self.written.lock().unwrap().push((path.to_owned(), what));
-        Ok(())
+        Ok(path.to_owned())
     }
 }
 
@@ -70,15 +71,15 @@ impl Host for Files {
         Ok(Some(ray.origin + ray.direction * near.t))
     }
 
-    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<(), String> {
+    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<PathBuf, String> {
         self.wrote(path, format!("{}x{}, {} bytes", size.width, size.height, rgba.len()))
     }
 
-    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<(), String> {
+    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<PathBuf, String> {
         self.wrote(path, format!("{} poses", camera_path.frames.len()))
     }
 
-    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<(), String> {
+    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<PathBuf, String> {
         self.wrote(path, format!("{} models", scene.models.len()))
     }
 }
@@ -109,6 +110,7 @@ impl Person {
             source: "statue.glod".into(),
             file: statue(folder.path()),
             original: None,
+            unit: None,
             placements: vec![Similarity::IDENTITY],
         };
         let files = Arc::new(Files { statue, built: AtomicBool::new(false), written: Mutex::default() });
@@ -377,6 +379,19 @@ fn a_distance_is_that_of_the_points_that_were_clicked() {
     assert_eq!(viewer.measuring.distance().unwrap().0, (points[0] - points[1]).length());
     assert!(person.harness.query_by_label_contains("Distance ").is_some());
     assert!(person.harness.query_by_label_contains("from the splats").is_some());
+}
+
+#[test]
+fn a_click_on_a_models_name_looks_at_it() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let home = person.viewer().own_viewpoint();
+    person.viewer().steer(&Input::Pan { by_px: DVec2::new(90.0, 40.0) }, 0.0);
+    person.viewer().steer(&Input::Orbit { by_px: DVec2::new(50.0, 0.0) }, 0.0);
+    person.clicks_on("statue.glod, 10 002 splats");
+    let now = person.viewer().own_viewpoint();
+    assert!((now.target - home.target).length() < 1e-6, "at its middle");
+    assert!(((now.eye - now.target).length() / (home.eye - home.target).length() - 1.0).abs() < 1e-6, "all of it");
+    assert!((now.eye - home.eye).length() > 0.1, "from where the person was");
 }
 
 #[test]

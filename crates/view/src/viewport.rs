@@ -1,6 +1,6 @@
 //! Mouse and keys over the picture.
 
-use crate::measure::digits;
+use crate::measure::length;
 use crate::navigation::{Anchor, Input};
 use crate::picker::Purpose;
 use crate::viewer::{Viewer, ZoomToCome};
@@ -228,7 +228,7 @@ impl Viewer {
         if let ([(a, _), (b, _)], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
             painter.line_segment([*a, *b], Stroke::new(1.5, color(uncertain)));
             let middle = *a + (*b - *a) * 0.5;
-            let text = digits(distance, uncertain);
+            let text = length(distance, uncertain, self.unit());
             let font = FontId::proportional(15.0);
             let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
             let at = egui::Rect::from_center_size(middle, galley.size());
