@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod clock;
+mod forced;
 pub mod host;
 mod jobs;
 mod mailbox;

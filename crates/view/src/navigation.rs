@@ -168,6 +168,14 @@ impl Navigation {
         self.keep(size);
     }
 
+    /// Takes another axis for up, and looks at all there is.
+    pub fn stand_up(&mut self, up_axis: UpAxis, size: ImageSize) {
+        let anew = Self::new(self.bounds, up_axis, self.fov_y_rad, size);
+        let (anchors, picked) = (std::mem::take(&mut self.anchors), std::mem::take(&mut self.picked));
+        *self = Self { anchors, picked, ..anew };
+        self.keep(size);
+    }
+
     /// Goes on with bounds that hardly differ, as of a model in place of its preview; home is around them.
     pub fn set_bounds(&mut self, bounds: Aabb, size: ImageSize) {
         let anew = Self::new(bounds, self.up_axis, self.fov_y_rad, size);

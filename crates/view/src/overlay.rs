@@ -10,6 +10,9 @@ use std::time::Duration;
 /// Of the list of what is being opened, in egui's points.
 const WORK_WIDTH: f32 = 360.0;
 
+/// Most that news and errors take before they go on in the next line, in points.
+const MESSAGE_WIDTH: f32 = 620.0;
+
 /// What mouse and keys do.
 const HELP: [(&str, &str); 19] = [
     ("drag", "turn around the pivot"),
@@ -177,6 +180,7 @@ impl Viewer {
         let news = egui::Area::new(egui::Id::unique("news")).anchor(Align2::LEFT_TOP, vec2(12.0, below_recording));
         if let Some(notice) = self.notices.iter().find(|notice| !notice.is_error) {
             news.interactable(false).show(ui.ctx(), |ui| {
+                ui.set_max_width(MESSAGE_WIDTH);
                 bubble(ui, Color32::from_rgb(45, 60, 80), |ui| text_of(ui, notice));
             });
             ui.ctx().request_repaint_after(Duration::from_secs_f64((notice.until - now).max(0.02)));
@@ -186,7 +190,7 @@ impl Viewer {
         }
         let errors = egui::Area::new(egui::Id::unique("errors")).anchor(Align2::LEFT_BOTTOM, vec2(12.0, -12.0));
         errors.show(ui.ctx(), |ui| {
-            ui.set_max_width(620.0);
+            ui.set_max_width(MESSAGE_WIDTH);
             self.notices.retain(|notice| {
                 notice.is_error.then(|| {
                     bubble(ui, Color32::from_rgb(110, 30, 30), |ui| {

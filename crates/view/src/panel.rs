@@ -4,7 +4,10 @@ use crate::mailbox::ModelKey;
 use crate::measure::{digits, length};
 use crate::navigation::Input;
 use crate::viewer::{Staged, Viewer};
-use egui::{CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, vec2};
+use egui::{
+    CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, Visuals, vec2,
+};
+use gigalod_geom::camera::UpAxis;
 use gigalod_render::Kernel;
 use gigalod_runtime::Limit;
 use gigalod_runtime::scene::description::{Light, LightKind, Places, SceneCamera, SceneDescription, SceneModel};
@@ -13,6 +16,14 @@ use std::path::{Path, PathBuf};
 
 /// Points.
 pub(crate) const WIDTH: f32 = 320.0;
+
+/// Colours of the interface: egui's dark ones, with text that is easier to read.
+pub(crate) fn visuals() -> Visuals {
+    let mut visuals = Visuals::dark();
+    visuals.widgets.noninteractive.fg_stroke.color = Color32::from_gray(190);
+    visuals.widgets.inactive.fg_stroke.color = Color32::from_gray(210);
+    visuals
+}
 
 impl Viewer {
     pub(crate) fn panel(&mut self, ui: &mut Ui, now: f64) {
@@ -69,6 +80,7 @@ impl Viewer {
     }
 
     fn picture_section(&mut self, ui: &mut Ui) {
+        let mut up = self.up();
         let settings = &mut self.settings;
         Grid::new("picture").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
             let label = ui.label("Error at rest").on_hover_text("Largest error on screen that is wanted");
@@ -110,7 +122,16 @@ impl Viewer {
                 }
             });
             ui.end_row();
+            ui.label("Up").on_hover_text("Many formats do not say which way is up");
+            ui.horizontal(|ui| {
+                ui.selectable_value(&mut up, UpAxis::Y, "y");
+                ui.selectable_value(&mut up, UpAxis::Z, "z");
+            });
+            ui.end_row();
         });
+        if up != self.up() {
+            self.stand_up(up);
+        }
     }
 
     fn budgets_section(&mut self, ui: &mut Ui) {
@@ -238,8 +259,11 @@ impl Viewer {
         let mut is_empty = true;
         for found in self.measuring.points() {
             is_empty = false;
-            let point = found.point.to_array().map(|x| digits(x, found.uncertain)).join("\n");
-            ui.label(egui::RichText::new(point).monospace());
+            // A sign takes as much room as none.
+            let sign = |x: f64| if x < 0.0 { "" } else { " " };
+            let coordinate = |(name, x)| format!("{name} {}{}", sign(x), digits(x, found.uncertain));
+            let point = ["x", "y", "z"].into_iter().zip(found.point.to_array()).map(coordinate);
+            ui.label(egui::RichText::new(point.collect::<Vec<_>>().join("\n")).monospace());
         }
         if is_empty && self.measuring.is_on {
             ui.weak("Click two points of the surface.");

@@ -387,11 +387,29 @@ fn a_click_on_a_models_name_looks_at_it() {
     let home = person.viewer().own_viewpoint();
     person.viewer().steer(&Input::Pan { by_px: DVec2::new(90.0, 40.0) }, 0.0);
     person.viewer().steer(&Input::Orbit { by_px: DVec2::new(50.0, 0.0) }, 0.0);
-    person.clicks_on("statue.glod, 10 002 splats");
+    let leaves = person.files.statue.file.skeleton().root().leaves;
+    person.clicks_on(&format!("statue.glod, {} splats", crate::panel::count(leaves)));
     let now = person.viewer().own_viewpoint();
     assert!((now.target - home.target).length() < 1e-6, "at its middle");
     assert!(((now.eye - now.target).length() / (home.eye - home.target).length() - 1.0).abs() < 1e-6, "all of it");
     assert!((now.eye - home.eye).length() > 0.1, "from where the person was");
+}
+
+#[test]
+fn a_model_is_stood_up_whatever_its_format_says() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.waits_until(|viewer| viewer.navigation.has_anchors());
+    let home = person.viewer().own_viewpoint();
+    person.clicks_on("z");
+    let upright = person.viewer().own_viewpoint();
+    assert_eq!((home.up, upright.up, upright.target), (DVec3::Y, DVec3::Z, home.target));
+    assert!(person.viewer().navigation.has_anchors() && person.sees_the_statue());
+    person.drags(MIDDLE, MIDDLE + vec2(60.0, 20.0), PointerButton::Primary, Modifiers::NONE);
+    person.presses(egui::Key::Home);
+    assert_eq!(person.viewer().own_viewpoint(), upright);
+    assert_eq!(person.viewer().scene().up, Some(gigalod_geom::camera::UpAxis::Z));
+    person.clicks_on("y");
+    assert_eq!(person.viewer().own_viewpoint(), home);
 }
 
 #[test]

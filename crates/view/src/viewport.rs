@@ -62,7 +62,8 @@ impl Viewer {
         ] {
             *toggled ^= pressed(key);
         }
-        if pressed(Key::Escape) {
+        // An open list is closed by it, and nothing else.
+        if !egui::Popup::is_any_open(ui.ctx()) && pressed(Key::Escape) {
             (self.shows_help, self.measuring.is_on) = (false, false);
             self.measuring.clear();
         }

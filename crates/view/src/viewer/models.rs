@@ -91,6 +91,13 @@ impl Viewer {
         self.scene_up.unwrap_or(up_of(first.unwrap_or_default()))
     }
 
+    /// Takes this way for up, whatever models say, and looks at everything.
+    pub(crate) fn stand_up(&mut self, up: UpAxis) {
+        self.scene_up = Some(up);
+        self.navigation.stand_up(up, self.size);
+        (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
+    }
+
     /// Looks at everything, from where the options say.
     pub(super) fn show_whole(&mut self) {
         let (bounds, up, fov) = (self.bounds(), self.up(), self.fov_deg.to_radians());
