@@ -32,7 +32,7 @@ impl Viewer {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 self.models_section(ui, now);
                 section(ui, "Figures", true, |ui| self.figures_section(ui));
-                section(ui, "Picture", true, |ui| self.picture_section(ui));
+                section(ui, "Picture", true, |ui| self.picture_section(ui, now));
                 section(ui, "Measure", true, |ui| self.measure_section(ui));
                 section(ui, "Save", true, |ui| self.save_section(ui, now));
                 section(ui, "Camera path", false, |ui| self.path_section(ui, now));
@@ -72,14 +72,14 @@ impl Viewer {
             });
         }
         if let Some(key) = looked_at {
-            self.look_at(key);
+            self.look_at(key, now);
         }
         if let Some(key) = removed {
             self.remove(key);
         }
     }
 
-    fn picture_section(&mut self, ui: &mut Ui) {
+    fn picture_section(&mut self, ui: &mut Ui, now: f64) {
         let mut up = self.up();
         let settings = &mut self.settings;
         Grid::new("picture").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
@@ -130,7 +130,7 @@ impl Viewer {
             ui.end_row();
         });
         if up != self.up() {
-            self.stand_up(up);
+            self.stand_up(up, now);
         }
     }
 

@@ -214,14 +214,19 @@ impl Viewer {
 
     /// Moves the camera; a path that is being played ends where it is.
     pub(crate) fn steer(&mut self, input: &Input, now: f64) {
-        if let Some(played) = self.recorder.at(now) {
-            self.recorder.pause();
-            self.navigation.go_to(played.eye, played.target, self.size);
-        }
+        self.leave_path(now);
         if !matches!(input, Input::Zoom { .. }) {
             (self.under_cursor, self.zoom_to_come) = (None, None);
         }
         self.navigation.apply(input, self.size);
+    }
+
+    /// A path that is being played ends where it is.
+    pub(crate) fn leave_path(&mut self, now: f64) {
+        if let Some(played) = self.recorder.at(now) {
+            self.recorder.pause();
+            self.navigation.go_to(played.eye, played.target, self.size);
+        }
     }
 
     /// Asks for what is under the cursor.

@@ -382,6 +382,24 @@ fn a_distance_is_that_of_the_points_that_were_clicked() {
 }
 
 #[test]
+fn a_point_is_where_the_click_was_and_not_where_the_mouse_went_in_the_same_frame() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.clicks_on("Pick points (M)");
+    let (at, button, modifiers) = (pos2(260.0, 300.0), PointerButton::Primary, Modifiers::NONE);
+    person.harness.event(Event::PointerMoved(at));
+    person.harness.run_steps(1);
+    let [down, up] = [true, false].map(|pressed| Event::PointerButton { pos: at, button, pressed, modifiers });
+    person.harness.input_mut().events.extend([down, up, Event::PointerMoved(pos2(20.0, 560.0))]);
+    person.harness.run_steps(1);
+    person.waits_until(|viewer| viewer.measuring.points().count() == 1);
+    let viewer = person.viewer();
+    let camera = viewer.camera(&viewer.own_viewpoint());
+    let point = viewer.measuring.points().next().unwrap().point;
+    let pixel = camera.pixel_of_view_point(camera.view_point(point));
+    assert!((pixel - DVec2::new(260.0, 300.0)).length() < 1e-6, "{pixel}");
+}
+
+#[test]
 fn a_click_on_a_models_name_looks_at_it() {
     let mut person = Person::opens(&["statue.glod"]);
     let home = person.viewer().own_viewpoint();
@@ -393,6 +411,15 @@ fn a_click_on_a_models_name_looks_at_it() {
     assert!((now.target - home.target).length() < 1e-6, "at its middle");
     assert!(((now.eye - now.target).length() / (home.eye - home.target).length() - 1.0).abs() < 1e-6, "all of it");
     assert!((now.eye - home.eye).length() > 0.1, "from where the person was");
+    // Also while the camera follows a path.
+    person.presses(egui::Key::R);
+    person.drags(MIDDLE, MIDDLE + vec2(120.0, -40.0), PointerButton::Secondary, Modifiers::NONE);
+    person.presses(egui::Key::R);
+    person.presses(egui::Key::Space);
+    assert!(person.viewer().recorder.is_playing());
+    person.clicks_on(&format!("statue.glod, {} splats", crate::panel::count(leaves)));
+    assert!(!person.viewer().recorder.is_playing());
+    assert!((person.viewer().own_viewpoint().target - home.target).length() < 1e-6);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::measure::length;
 use crate::navigation::{Anchor, Input};
 use crate::picker::Purpose;
 use crate::viewer::{Viewer, ZoomToCome};
-use egui::{Align2, Color32, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
+use egui::{Align2, Color32, CursorIcon, Event, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
 use gigalod_geom::Camera;
 use glam::{DQuat, DVec2, DVec3};
 use std::time::Duration;
@@ -154,7 +154,13 @@ impl Viewer {
         if self.measuring.is_on && response.hovered() {
             ui.set_cursor_icon(CursorIcon::Crosshair);
         }
-        if let Some(at) = response.interact_pointer_pos() {
+        // Where the button came up: where frames are long, the mouse is elsewhere at their end.
+        let came_up = |event: &Event| match event {
+            Event::PointerButton { pos, button: PointerButton::Primary, pressed: false, .. } => Some(*pos),
+            _ => None,
+        };
+        let clicked_at = ui.input(|input| input.events.iter().rev().find_map(came_up));
+        if let Some(at) = clicked_at.or(response.interact_pointer_pos()) {
             if response.double_clicked() && !self.measuring.is_on {
                 self.pick(Purpose::Pivot, px(at));
             } else if response.clicked() && self.measuring.is_on {

@@ -71,7 +71,8 @@ impl Viewer {
     }
 
     /// Looks at one model, from the side that the camera is on.
-    pub(crate) fn look_at(&mut self, key: ModelKey) {
+    pub(crate) fn look_at(&mut self, key: ModelKey, now: f64) {
+        self.leave_path(now);
         if let Some(staged) = self.models.iter().find(|staged| staged.key == key) {
             self.navigation.look_at(bounds_of(&staged.model), self.size);
             (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
@@ -92,7 +93,8 @@ impl Viewer {
     }
 
     /// Takes this way for up, whatever models say, and looks at everything.
-    pub(crate) fn stand_up(&mut self, up: UpAxis) {
+    pub(crate) fn stand_up(&mut self, up: UpAxis, now: f64) {
+        self.leave_path(now);
         self.scene_up = Some(up);
         self.navigation.stand_up(up, self.size);
         (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
