@@ -35,7 +35,9 @@ impl Screen {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let framebuffer = tempfile::tempdir().unwrap();
         let server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", &format!("{WIDTH}x{HEIGHT}x24"), "-nolisten", "tcp", "-fbdir"])
+            .args(["-displayfd", "1", "-screen", "0", &format!("{WIDTH}x{HEIGHT}x24"), "-nolisten", "tcp"])
+            // Without that it begins anew, and refuses who comes meanwhile, when the last window is closed.
+            .args(["-noreset", "-fbdir"])
             .arg(framebuffer.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
