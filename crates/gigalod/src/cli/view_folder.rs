@@ -88,7 +88,7 @@ mod tests {
             ("a.GLOD", Kind::Model, 5),
             ("b.ply.gz", Kind::Raw, 5),
             ("c.laz", Kind::Raw, 5),
-            ("path.json", Kind::Path, 17),
+            ("path.json", Kind::Path, 16),
             ("scene.toml", Kind::Scene, 5),
         ];
         assert_eq!(entries, expected.map(|(name, kind, bytes)| (name.to_string(), kind, bytes)));
