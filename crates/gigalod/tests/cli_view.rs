@@ -35,7 +35,9 @@ impl Screen {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let framebuffer = tempfile::tempdir().unwrap();
         let server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", &format!("{WIDTH}x{HEIGHT}x24"), "-nolisten", "tcp", "-fbdir"])
+            .args(["-displayfd", "1", "-screen", "0", &format!("{WIDTH}x{HEIGHT}x24"), "-nolisten", "tcp"])
+            // Without that it begins anew, and refuses who comes meanwhile, when the last window is closed.
+            .args(["-noreset", "-fbdir"])
             .arg(framebuffer.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -306,6 +308,26 @@ fn a_window_survives_what_happens_to_it() {
     let problems = figures["problems"].as_array().unwrap();
     let is_told = problems.len() == 1 && problems[0].as_str().unwrap().contains("lost and opened anew");
     assert!(is_told, "{problems:?}");
+}
+
+/// What another program does to the window, the viewer tells in a line, and writes what it was asked to write.
+#[test]
+fn a_window_that_is_destroyed_ends_the_viewer_with_a_line() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    // While it draws, and while it rests.
+    for picture in ["statue-1.png", "statue-2.png"] {
+        let mut viewing = screen.view(place.path(), [&statue().glod]);
+        viewing.takes_picture(picture);
+        if picture == "statue-1.png" {
+            viewing.hand(&["mousemove", "300", "300", "mousedown", "1", "mousemove", "340", "310"]);
+        }
+        viewing.hand(&["search", "--name", "^Gigalod$", "windowclose"]);
+        let ran = Ran::of(viewing.child.take().unwrap().wait_with_output().unwrap());
+        viewing.hand(&["mouseup", "1"]);
+        assert_eq!(ran.status, 1, "{ran:?}");
+        assert_eq!(ran.stderr, "error: the window was closed by force\n");
+    }
 }
 
 #[test]

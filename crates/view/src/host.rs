@@ -20,6 +20,8 @@ pub struct Model {
     pub file: ModelFile,
     /// What it was built from, where that lies at hand: picked points are exact then.
     pub original: Option<PathBuf>,
+    /// What a length of 1 is, where that is known: a symbol such as `m`.
+    pub unit: Option<String>,
     /// Where it stands, at least once.
     pub placements: Vec<Similarity>,
 }
@@ -103,23 +105,25 @@ pub trait Host: Send + Sync + 'static {
     /// What is wrong with the original; also when `work` was cancelled.
     fn exact_point(&self, original: &Path, ray: &Ray, near: &Hit, work: &Work) -> Result<Option<DVec3>, String>;
 
-    /// Writes a picture: 8-bit sRGB and alpha, rows from the top.
+    /// Writes a picture: 8-bit sRGB and alpha, rows from the top. Returns the file's name: what is there already is not
+    /// replaced, and names count up instead ([`crate::next_name`]).
     ///
     /// # Errors
     /// What is wrong with the name or the disk.
-    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<(), String>;
+    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<PathBuf, String>;
 
-    /// Writes a camera path.
+    /// Writes a camera path. Returns the file's name: only what this host has written itself is replaced.
     ///
     /// # Errors
     /// What is wrong with the name or the disk.
-    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<(), String>;
+    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<PathBuf, String>;
 
-    /// Writes a scene; its files are named relative to its folder where they lie below it.
+    /// Writes a scene; its files are named relative to its folder where they lie below it. Returns the file's name: only what
+    /// this host has written itself is replaced.
     ///
     /// # Errors
     /// What is wrong with the name or the disk.
-    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<(), String>;
+    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<PathBuf, String>;
 }
 
 /// Long work that somebody watches and may cancel. Clones are the same one.

@@ -12,7 +12,8 @@ pub(crate) enum Finished {
     Opened(JobNumber, Box<Result<Opened, String>>),
     /// By a person, with the file's name.
     Cancelled(JobNumber, String),
-    Wrote(PathBuf, Result<(), String>),
+    /// What the file was to be called, and what it is called.
+    Wrote(PathBuf, Result<PathBuf, String>),
 }
 
 /// Names a job.
@@ -81,7 +82,7 @@ impl Jobs {
         self.write(name, move |name| host.write_scene(name, &scene));
     }
 
-    fn write(&mut self, name: PathBuf, write: impl FnOnce(&Path) -> Result<(), String> + Send + 'static) {
+    fn write(&mut self, name: PathBuf, write: impl FnOnce(&Path) -> Result<PathBuf, String> + Send + 'static) {
         self.writing += 1;
         self.start(move |_| {
             let wrote = write(&name);

@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod clock;
+mod forced;
 pub mod host;
 mod jobs;
 mod mailbox;
@@ -37,4 +38,5 @@ pub use host::{Entry, Folder, Host, Kind, Model, Opened, OpenedScene, Preview, P
 pub use mailbox::Figures;
 pub use report::{Measured, Report, Tally, percentile};
 pub use settings::{FirstLook, Options, Settings};
+pub use viewer::next_name;
 pub use window::{ViewError, run};

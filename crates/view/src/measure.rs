@@ -55,6 +55,13 @@ pub(crate) fn digits(value: f64, uncertain: f64) -> String {
     format!("{value:.*}", decimals as usize)
 }
 
+/// A length as it is told: `316 ± 48 ft`.
+pub(crate) fn length(value: f64, uncertain: f64, unit: Option<&str>) -> String {
+    let around = if uncertain > 0.0 { format!(" ± {}", digits(uncertain, uncertain)) } else { String::new() };
+    let unit = unit.map(|unit| format!(" {unit}")).unwrap_or_default();
+    format!("{}{around}{unit}", digits(value, uncertain))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,6 +92,8 @@ mod tests {
     fn numbers_have_the_digits_that_are_true() {
         assert_eq!(digits(123.456_789, 0.01), "123.46");
         assert_eq!(digits(0.001_234_567, 1e-6), "0.001235");
+        assert_eq!(length(316.2, 48.2, Some("ft")), "316 ± 48 ft");
+        assert_eq!(length(1.666_364_83, 0.0, None), "1.66636483");
         assert_eq!(digits(12.345_678_912_3, 0.0), "12.3456789");
         assert_eq!(digits(98_765.0, 500.0), "98765");
     }

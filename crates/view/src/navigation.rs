@@ -161,6 +161,21 @@ impl Navigation {
         }
     }
 
+    /// Looks at a part of what there is, from the side that it was seen from.
+    pub fn look_at(&mut self, bounds: Aabb, size: ImageSize) {
+        let one = Self::new(bounds, self.up_axis, self.fov_y_rad, size);
+        self.pose = Pose { pivot: one.home.pivot, distance: one.fit, ..self.pose };
+        self.keep(size);
+    }
+
+    /// Takes another axis for up, and looks at all there is.
+    pub fn stand_up(&mut self, up_axis: UpAxis, size: ImageSize) {
+        let anew = Self::new(self.bounds, up_axis, self.fov_y_rad, size);
+        let (anchors, picked) = (std::mem::take(&mut self.anchors), std::mem::take(&mut self.picked));
+        *self = Self { anchors, picked, ..anew };
+        self.keep(size);
+    }
+
     /// Goes on with bounds that hardly differ, as of a model in place of its preview; home is around them.
     pub fn set_bounds(&mut self, bounds: Aabb, size: ImageSize) {
         let anew = Self::new(bounds, self.up_axis, self.fov_y_rad, size);

@@ -10,6 +10,11 @@ use std::time::Duration;
 /// Of the list of what is being opened, in egui's points.
 const WORK_WIDTH: f32 = 360.0;
 
+/// Most that news and errors take before they go on in the next line, in points.
+const MESSAGE_WIDTH: f32 = 620.0;
+/// Of theirs, from the picture's edges.
+const MESSAGE_MARGIN: f32 = 20.0;
+
 /// What mouse and keys do.
 const HELP: [(&str, &str); 19] = [
     ("drag", "turn around the pivot"),
@@ -109,7 +114,7 @@ impl Viewer {
         let place = self.picture_rect(ui);
         let width = (place.width() - 60.0).clamp(240.0, 520.0);
         let window = Window::new("Open").open(&mut is_open).collapsible(false).resizable(false);
-        window.pivot(Align2::CENTER_CENTER).default_pos(place.center()).show(ui.ctx(), |ui| {
+        window.pivot(Align2::CENTER_CENTER).current_pos(place.center()).movable(false).show(ui.ctx(), |ui| {
             ui.set_width(width);
             ui.horizontal(|ui| {
                 let above = folder.path.parent();
@@ -173,10 +178,12 @@ impl Viewer {
     /// The newest piece of news, through which clicks reach the picture, and errors until they are closed.
     fn notices(&mut self, ui: &Ui, now: f64) {
         self.notices.retain(|notice| notice.until > now);
+        let width = (self.picture_rect(ui).width() - 2.0 * MESSAGE_MARGIN).clamp(100.0, MESSAGE_WIDTH);
         let below_recording = if self.recorder.is_recording() { 36.0 } else { 10.0 };
         let news = egui::Area::new(egui::Id::unique("news")).anchor(Align2::LEFT_TOP, vec2(12.0, below_recording));
         if let Some(notice) = self.notices.iter().find(|notice| !notice.is_error) {
             news.interactable(false).show(ui.ctx(), |ui| {
+                ui.set_max_width(width);
                 bubble(ui, Color32::from_rgb(45, 60, 80), |ui| text_of(ui, notice));
             });
             ui.ctx().request_repaint_after(Duration::from_secs_f64((notice.until - now).max(0.02)));
@@ -186,7 +193,7 @@ impl Viewer {
         }
         let errors = egui::Area::new(egui::Id::unique("errors")).anchor(Align2::LEFT_BOTTOM, vec2(12.0, -12.0));
         errors.show(ui.ctx(), |ui| {
-            ui.set_max_width(620.0);
+            ui.set_max_width(width);
             self.notices.retain(|notice| {
                 notice.is_error.then(|| {
                     bubble(ui, Color32::from_rgb(110, 30, 30), |ui| {

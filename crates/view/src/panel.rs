@@ -1,10 +1,13 @@
 //! The panel: what can be chosen, and what is going on.
 
 use crate::mailbox::ModelKey;
-use crate::measure::digits;
+use crate::measure::{digits, length};
 use crate::navigation::Input;
 use crate::viewer::{Staged, Viewer};
-use egui::{CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, vec2};
+use egui::{
+    CollapsingHeader, Color32, DragValue, Grid, Panel, ScrollArea, Sense, Slider, Stroke, TextEdit, Ui, Visuals, vec2,
+};
+use gigalod_geom::camera::UpAxis;
 use gigalod_render::Kernel;
 use gigalod_runtime::scene::description::{Light, LightKind, Places, SceneCamera, SceneDescription, SceneModel};
 use gigalod_runtime::splats::Tint;
@@ -14,6 +17,14 @@ use std::path::{Path, PathBuf};
 /// Points.
 pub(crate) const WIDTH: f32 = 320.0;
 
+/// Colours of the interface: egui's dark ones, with text that is easier to read.
+pub(crate) fn visuals() -> Visuals {
+    let mut visuals = Visuals::dark();
+    visuals.widgets.noninteractive.fg_stroke.color = Color32::from_gray(190);
+    visuals.widgets.inactive.fg_stroke.color = Color32::from_gray(210);
+    visuals
+}
+
 impl Viewer {
     pub(crate) fn panel(&mut self, ui: &mut Ui, now: f64) {
         let frame = egui::Frame::side_top_panel(ui.style()).inner_margin(10.0);
@@ -21,7 +32,7 @@ impl Viewer {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 self.models_section(ui, now);
                 section(ui, "Figures", true, |ui| self.figures_section(ui));
-                section(ui, "Picture", true, |ui| self.picture_section(ui));
+                section(ui, "Picture", true, |ui| self.picture_section(ui, now));
                 section(ui, "Measure", true, |ui| self.measure_section(ui));
                 section(ui, "Save", true, |ui| self.save_section(ui, now));
                 section(ui, "Camera path", false, |ui| self.path_section(ui, now));
@@ -42,7 +53,7 @@ impl Viewer {
             }
             ui.toggle_value(&mut self.shows_help, "Keys (F1)");
         });
-        let mut removed: Option<ModelKey> = None;
+        let (mut removed, mut looked_at): (Option<ModelKey>, Option<ModelKey>) = (None, None);
         for Staged { key, model, preview } in &self.models {
             ui.horizontal(|ui| {
                 if ui.small_button("x").on_hover_text("Take this model away").clicked() {
@@ -56,15 +67,22 @@ impl Viewer {
                         ModelFile::Hybrid(file) => format!("{name}, {} nodes", count(file.skeleton().root().nodes)),
                     },
                 };
-                ui.add(egui::Label::new(text).truncate()).on_hover_text(model.source.display().to_string());
+                let name = ui.add(egui::Label::new(text).truncate().sense(Sense::click()));
+                if name.on_hover_text(format!("{}\nClick to look at it", model.source.display())).clicked() {
+                    looked_at = Some(*key);
+                }
             });
+        }
+        if let Some(key) = looked_at {
+            self.look_at(key, now);
         }
         if let Some(key) = removed {
             self.remove(key);
         }
     }
 
-    fn picture_section(&mut self, ui: &mut Ui) {
+    fn picture_section(&mut self, ui: &mut Ui, now: f64) {
+        let mut up = self.up();
         let settings = &mut self.settings;
         Grid::new("picture").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
             let label = ui.label("Error at rest").on_hover_text("Largest error on screen that is wanted");
@@ -106,7 +124,16 @@ impl Viewer {
                 }
             });
             ui.end_row();
+            ui.label("Up").on_hover_text("Many formats do not say which way is up");
+            ui.horizontal(|ui| {
+                ui.selectable_value(&mut up, UpAxis::Y, "y");
+                ui.selectable_value(&mut up, UpAxis::Z, "z");
+            });
+            ui.end_row();
         });
+        if up != self.up() {
+            self.stand_up(up, now);
+        }
     }
 
     fn budgets_section(&mut self, ui: &mut Ui) {
@@ -230,7 +257,10 @@ impl Viewer {
         painter.hline(rect.x_range(), y(target), Stroke::new(1.0, ui.visuals().weak_text_color()));
         let label = format!("{most:.0} ms");
         let font = egui::FontId::proportional(10.0);
-        painter.text(rect.left_top() + vec2(3.0, 2.0), egui::Align2::LEFT_TOP, label, font, ui.visuals().text_color());
+        let galley = painter.layout_no_wrap(label, font, ui.visuals().text_color());
+        let at = egui::Rect::from_min_size(rect.left_top() + vec2(3.0, 2.0), galley.size());
+        painter.rect_filled(at.expand(2.0), 2.0, ui.visuals().extreme_bg_color);
+        painter.galley(at.min, galley, ui.visuals().text_color());
     }
 
     fn measure_section(&mut self, ui: &mut Ui) {
@@ -243,18 +273,21 @@ impl Viewer {
         let mut is_empty = true;
         for found in self.measuring.points() {
             is_empty = false;
-            let point = found.point.to_array().map(|x| digits(x, found.uncertain)).join("\n");
-            ui.label(egui::RichText::new(point).monospace());
+            // A sign takes as much room as none.
+            let sign = |x: f64| if x < 0.0 { "" } else { " " };
+            let coordinate = |(name, x)| format!("{name} {}{}", sign(x), digits(x, found.uncertain));
+            let point = ["x", "y", "z"].into_iter().zip(found.point.to_array()).map(coordinate);
+            ui.label(egui::RichText::new(point.collect::<Vec<_>>().join("\n")).monospace());
         }
         if is_empty && self.measuring.is_on {
             ui.weak("Click two points of the surface.");
         }
         if let Some((distance, uncertain, to_come)) = self.measuring.distance() {
-            ui.strong(format!("Distance {}", digits(distance, uncertain)));
+            ui.strong(format!("Distance {}", length(distance, uncertain, self.unit())));
             if to_come {
-                ui.weak(format!("± {uncertain:.2e}; reading the original"));
+                ui.weak("reading the original");
             } else if uncertain > 0.0 {
-                ui.weak(format!("± {uncertain:.2e}, from the splats"));
+                ui.weak("from the splats, as the original is not at hand");
             } else {
                 ui.weak("exact, from the original");
             }

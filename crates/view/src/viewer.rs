@@ -13,6 +13,7 @@ mod names;
 mod notices;
 
 pub(crate) use names::Names;
+pub use names::next_name;
 pub(crate) use notices::Notice;
 
 use crate::host::{Folder, Host, Model};
@@ -125,7 +126,7 @@ impl Viewer {
             frame_times: std::collections::VecDeque::new(),
             names: Names::default(),
             shows_help: false,
-            shows_panel: true,
+            shows_panel: options.size.width > 2 * panel::WIDTH as u32,
             flies: false,
             under_cursor: None,
             zoom_to_come: None,
@@ -140,6 +141,9 @@ impl Viewer {
             told_problems: Vec::new(),
             tally: Tally::default(),
         };
+        if !viewer.shows_panel {
+            viewer.notice("F2 shows the panel", 0.0);
+        }
         options.files.iter().for_each(|file| viewer.open(file));
         viewer
     }
@@ -210,14 +214,19 @@ impl Viewer {
 
     /// Moves the camera; a path that is being played ends where it is.
     pub(crate) fn steer(&mut self, input: &Input, now: f64) {
-        if let Some(played) = self.recorder.at(now) {
-            self.recorder.pause();
-            self.navigation.go_to(played.eye, played.target, self.size);
-        }
+        self.leave_path(now);
         if !matches!(input, Input::Zoom { .. }) {
             (self.under_cursor, self.zoom_to_come) = (None, None);
         }
         self.navigation.apply(input, self.size);
+    }
+
+    /// A path that is being played ends where it is.
+    pub(crate) fn leave_path(&mut self, now: f64) {
+        if let Some(played) = self.recorder.at(now) {
+            self.recorder.pause();
+            self.navigation.go_to(played.eye, played.target, self.size);
+        }
     }
 
     /// Asks for what is under the cursor.

@@ -2,6 +2,7 @@
 
 use crate::host::{Entry, Folder, Host, Kind, Model, Opened, Preview, Work};
 use crate::mailbox::{Figures, Mailbox, Order};
+use crate::navigation::Input;
 use crate::pick::{Hit, Ray};
 use crate::picker;
 use crate::settings::{FirstLook, Options, Settings};
@@ -36,9 +37,9 @@ struct Files {
 }
 
 impl Files {
-    fn wrote(&self, path: &Path, what: String) -> Result<(), String> {
+    fn wrote(&self, path: &Path, what: String) -> Result<PathBuf, String> {
         self.written.lock().unwrap().push((path.to_owned(), what));
-        Ok(())
+        Ok(path.to_owned())
     }
 }
 
@@ -70,15 +71,15 @@ impl Host for Files {
         Ok(Some(ray.origin + ray.direction * near.t))
     }
 
-    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<(), String> {
+    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<PathBuf, String> {
         self.wrote(path, format!("{}x{}, {} bytes", size.width, size.height, rgba.len()))
     }
 
-    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<(), String> {
+    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<PathBuf, String> {
         self.wrote(path, format!("{} poses", camera_path.frames.len()))
     }
 
-    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<(), String> {
+    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<PathBuf, String> {
         self.wrote(path, format!("{} models", scene.models.len()))
     }
 }
@@ -109,6 +110,7 @@ impl Person {
             source: "statue.glod".into(),
             file: statue(folder.path()).into(),
             original: None,
+            unit: None,
             placements: vec![Similarity::IDENTITY],
         };
         let files = Arc::new(Files { statue, built: AtomicBool::new(false), written: Mutex::default() });
@@ -377,6 +379,64 @@ fn a_distance_is_that_of_the_points_that_were_clicked() {
     assert_eq!(viewer.measuring.distance().unwrap().0, (points[0] - points[1]).length());
     assert!(person.harness.query_by_label_contains("Distance ").is_some());
     assert!(person.harness.query_by_label_contains("from the splats").is_some());
+}
+
+#[test]
+fn a_point_is_where_the_click_was_and_not_where_the_mouse_went_in_the_same_frame() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.clicks_on("Pick points (M)");
+    let (at, button, modifiers) = (pos2(260.0, 300.0), PointerButton::Primary, Modifiers::NONE);
+    person.harness.event(Event::PointerMoved(at));
+    person.harness.run_steps(1);
+    let [down, up] = [true, false].map(|pressed| Event::PointerButton { pos: at, button, pressed, modifiers });
+    person.harness.input_mut().events.extend([down, up, Event::PointerMoved(pos2(20.0, 560.0))]);
+    person.harness.run_steps(1);
+    person.waits_until(|viewer| viewer.measuring.points().count() == 1);
+    let viewer = person.viewer();
+    let camera = viewer.camera(&viewer.own_viewpoint());
+    let point = viewer.measuring.points().next().unwrap().point;
+    let pixel = camera.pixel_of_view_point(camera.view_point(point));
+    assert!((pixel - DVec2::new(260.0, 300.0)).length() < 1e-6, "{pixel}");
+}
+
+#[test]
+fn a_click_on_a_models_name_looks_at_it() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let home = person.viewer().own_viewpoint();
+    person.viewer().steer(&Input::Pan { by_px: DVec2::new(90.0, 40.0) }, 0.0);
+    person.viewer().steer(&Input::Orbit { by_px: DVec2::new(50.0, 0.0) }, 0.0);
+    let leaves = person.files.statue.file.skeleton().root().leaves;
+    person.clicks_on(&format!("statue.glod, {} splats", crate::panel::count(leaves)));
+    let now = person.viewer().own_viewpoint();
+    assert!((now.target - home.target).length() < 1e-6, "at its middle");
+    assert!(((now.eye - now.target).length() / (home.eye - home.target).length() - 1.0).abs() < 1e-6, "all of it");
+    assert!((now.eye - home.eye).length() > 0.1, "from where the person was");
+    // Also while the camera follows a path.
+    person.presses(egui::Key::R);
+    person.drags(MIDDLE, MIDDLE + vec2(120.0, -40.0), PointerButton::Secondary, Modifiers::NONE);
+    person.presses(egui::Key::R);
+    person.presses(egui::Key::Space);
+    assert!(person.viewer().recorder.is_playing());
+    person.clicks_on(&format!("statue.glod, {} splats", crate::panel::count(leaves)));
+    assert!(!person.viewer().recorder.is_playing());
+    assert!((person.viewer().own_viewpoint().target - home.target).length() < 1e-6);
+}
+
+#[test]
+fn a_model_is_stood_up_whatever_its_format_says() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.waits_until(|viewer| viewer.navigation.has_anchors());
+    let home = person.viewer().own_viewpoint();
+    person.clicks_on("z");
+    let upright = person.viewer().own_viewpoint();
+    assert_eq!((home.up, upright.up, upright.target), (DVec3::Y, DVec3::Z, home.target));
+    assert!(person.viewer().navigation.has_anchors() && person.sees_the_statue());
+    person.drags(MIDDLE, MIDDLE + vec2(60.0, 20.0), PointerButton::Primary, Modifiers::NONE);
+    person.presses(egui::Key::Home);
+    assert_eq!(person.viewer().own_viewpoint(), upright);
+    assert_eq!(person.viewer().scene().up, Some(gigalod_geom::camera::UpAxis::Z));
+    person.clicks_on("y");
+    assert_eq!(person.viewer().own_viewpoint(), home);
 }
 
 #[test]

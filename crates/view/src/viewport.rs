@@ -1,10 +1,10 @@
 //! Mouse and keys over the picture.
 
-use crate::measure::digits;
+use crate::measure::length;
 use crate::navigation::{Anchor, Input};
 use crate::picker::Purpose;
 use crate::viewer::{Viewer, ZoomToCome};
-use egui::{Align2, Color32, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
+use egui::{Align2, Color32, CursorIcon, Event, FontId, Key, Modifiers, PointerButton, Pos2, Sense, Stroke, Ui};
 use gigalod_geom::Camera;
 use glam::{DQuat, DVec2, DVec3};
 use std::time::Duration;
@@ -62,7 +62,8 @@ impl Viewer {
         ] {
             *toggled ^= pressed(key);
         }
-        if pressed(Key::Escape) {
+        // An open list is closed by it, and nothing else.
+        if !egui::Popup::is_any_open(ui.ctx()) && pressed(Key::Escape) {
             (self.shows_help, self.measuring.is_on) = (false, false);
             self.measuring.clear();
         }
@@ -153,7 +154,13 @@ impl Viewer {
         if self.measuring.is_on && response.hovered() {
             ui.set_cursor_icon(CursorIcon::Crosshair);
         }
-        if let Some(at) = response.interact_pointer_pos() {
+        // Where the button came up: where frames are long, the mouse is elsewhere at their end.
+        let came_up = |event: &Event| match event {
+            Event::PointerButton { pos, button: PointerButton::Primary, pressed: false, .. } => Some(*pos),
+            _ => None,
+        };
+        let clicked_at = ui.input(|input| input.events.iter().rev().find_map(came_up));
+        if let Some(at) = clicked_at.or(response.interact_pointer_pos()) {
             if response.double_clicked() && !self.measuring.is_on {
                 self.pick(Purpose::Pivot, px(at));
             } else if response.clicked() && self.measuring.is_on {
@@ -228,7 +235,7 @@ impl Viewer {
         if let ([(a, _), (b, _)], Some((distance, uncertain, _))) = (&places[..], self.measuring.distance()) {
             painter.line_segment([*a, *b], Stroke::new(1.5, color(uncertain)));
             let middle = *a + (*b - *a) * 0.5;
-            let text = digits(distance, uncertain);
+            let text = length(distance, uncertain, self.unit());
             let font = FontId::proportional(15.0);
             let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
             let at = egui::Rect::from_center_size(middle, galley.size());

@@ -1,8 +1,10 @@
 //! The window and its thread: events in, pictures out. Nothing here waits but for events and the display.
 
 use crate::clock::thread_cpu_ms;
+use crate::forced::{Forced, unless_forced};
 use crate::host::Host;
 use crate::mailbox::{Mailbox, Order};
+use crate::panel::visuals;
 use crate::picker;
 use crate::report::{Measured, Report};
 use crate::settings::Options;
@@ -39,6 +41,8 @@ pub enum ViewError {
     Render(RenderError),
     /// The system gives no threads.
     Threads(std::io::Error),
+    /// Another program has destroyed the window.
+    Forced,
 }
 
 impl std::fmt::Display for ViewError {
@@ -47,6 +51,7 @@ impl std::fmt::Display for ViewError {
             Self::Window(why) => write!(f, "could not open a window: {why}"),
             Self::Render(error) => error.fmt(f),
             Self::Threads(error) => write!(f, "could not start threads: {error}"),
+            Self::Forced => f.write_str("the window was closed by force"),
         }
     }
 }
@@ -56,7 +61,8 @@ impl std::error::Error for ViewError {}
 /// Another thread has news.
 struct Wake;
 
-/// Opens a window and returns when the person has closed it. To be called on the program's first thread, once.
+/// Opens a window and returns when the person has closed it. To be called on the program's first thread, once: it leaves a panic
+/// hook that keeps quiet about a window that another program destroys.
 ///
 /// # Errors
 /// There is no window, no device, or it was lost for good. All else that goes wrong is told in the window.
@@ -65,10 +71,14 @@ pub fn run(options: Options, host: Arc<dyn Host>) -> Result<Report, ViewError> {
     let events = EventLoop::<Wake>::with_user_event().build().map_err(|error| window_error(&error))?;
     let proxy = events.create_proxy();
     let mut app = App { options, host, proxy, running: None, error: None };
-    events.run_app(&mut app).map_err(|error| window_error(&error))?;
-    match (app.error, app.running) {
+    match unless_forced(|| events.run_app(&mut app)) {
+        Ok(ended) => ended.map_err(|error| window_error(&error))?,
+        Err(Forced) => app.error = Some(ViewError::Forced),
+    }
+    let report = app.running.map(Running::end);
+    match (app.error, report) {
         (Some(error), _) => Err(error),
-        (None, Some(running)) => Ok(running.end()),
+        (None, Some(report)) => Ok(report),
         (None, None) => Err(ViewError::Window("it was closed before it was open".into())),
     }
 }
@@ -127,8 +137,11 @@ impl ApplicationHandler<Wake> for App {
             running.ask();
         }
         match event {
-            // Destroyed: somebody else has taken it away.
-            WindowEvent::CloseRequested | WindowEvent::Destroyed => events.exit(),
+            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::Destroyed => {
+                self.error = Some(ViewError::Forced);
+                events.exit();
+            }
             WindowEvent::Resized(size) => {
                 running.size = ImageSize { width: size.width, height: size.height };
                 running.painter.resize(running.size);
@@ -213,6 +226,7 @@ impl Running {
 
         let context = egui::Context::default();
         context.set_theme(egui::Theme::Dark);
+        context.set_visuals_of(egui::Theme::Dark, visuals());
         let most = Some(painter.gpu().max_picture_edge() as usize);
         let scale = Some(window.scale_factor() as f32);
         let input = egui_winit::State::new(context.clone(), ViewportId::ROOT, &*window, scale, None, most);
@@ -248,6 +262,8 @@ impl Running {
         self.must_paint |= !std::mem::take(&mut self.asked);
         if std::mem::take(&mut self.viewer.wants_new_device) {
             self.painter.gpu().close();
+            // At rest nobody else would notice.
+            self.must_paint = true;
         }
         if let Some(why) = self.viewer.wants_recovery.take() {
             self.recover(&why)?;

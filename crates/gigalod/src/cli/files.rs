@@ -4,7 +4,7 @@ use super::error::CliError;
 use gigalod_build::{FileIdentity, SideLog};
 #[cfg(feature = "view")]
 use gigalod_format::Kind;
-use gigalod_format::{Container, FileStore};
+use gigalod_format::{Container, FileStore, FormatError};
 use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
 use gigalod_runtime::ModelFile;
 use std::fs::File;
@@ -61,7 +61,13 @@ pub(crate) fn side_files(path: &Path, side: &SideLog) -> Box<dyn SideFiles> {
 pub(crate) fn open_container(path: &Path) -> Result<Container, CliError> {
     expect_regular(path)?;
     let store = FileStore::open(path).map_err(|error| CliError::in_file(path, error))?;
-    Container::open(Arc::new(store)).map_err(|error| CliError::format(path, &error))
+    Container::open(Arc::new(store)).map_err(|error| {
+        let wrong = CliError::format(path, &error);
+        match error {
+            FormatError::Magic { .. } => wrong.hint("is it a model? gigalod build makes a .glod file of it"),
+            _ => wrong,
+        }
+    })
 }
 
 /// Opens a `.glod` file for drawing, of whichever kind it is.

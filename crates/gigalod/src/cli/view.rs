@@ -100,11 +100,11 @@ pub(crate) fn run(args: &ViewArgs, _console: &Console) -> Result<Outcome, CliErr
         first_look,
         size: args.draw.size,
     };
-    let host = Arc::new(Files { build: args.build.clone() });
+    let host = Arc::new(Files::new(args.build.clone()));
     let report = gigalod_view::run(options, host).map_err(|error| match error {
         ViewError::Window(_) => CliError::new(error).hint("on Linux it needs an X server; `gigalod render` needs none"),
         ViewError::Render(error) => super::stage::graphics_error(error),
-        ViewError::Threads(_) => CliError::new(error),
+        ViewError::Threads(_) | ViewError::Forced => CliError::new(error),
     })?;
     let text = describe(&report);
     Ok(Outcome::new(&json(report), text))

@@ -16,13 +16,14 @@ use gigalod_geom::{CameraPath, ImageSize};
 use gigalod_runtime::Similarity;
 use gigalod_runtime::scene::description::SceneDescription;
 use gigalod_view::pick::{Hit, Ray};
-use gigalod_view::{Host, Model, Opened, OpenedScene, Preview, Work};
+use gigalod_view::{Host, Model, Opened, OpenedScene, Preview, Work, next_name};
 use glam::DVec3;
+use std::collections::HashSet;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// How often a build is asked whether it is done.
@@ -30,7 +31,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What the viewer needs of files.
 pub(crate) struct Files {
-    pub(crate) build: BuildOptions,
+    build: BuildOptions,
+    /// Camera paths and scenes that were written; these may be written again.
+    written: Mutex<HashSet<PathBuf>>,
 }
 
 impl Host for Files {
@@ -42,23 +45,39 @@ impl Host for Files {
         exact::point(original, ray, near, &|| work.is_cancelled()).map_err(told)
     }
 
-    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<(), String> {
+    fn write_picture(&self, path: &Path, size: ImageSize, rgba: &[u8]) -> Result<PathBuf, String> {
+        let path = free_name(path);
         let write = || {
-            files::check_output(path, &[])?;
-            files::check_png_name(path)?;
-            files::write_png(path, size, rgba)
+            files::check_output(&path, &[])?;
+            files::check_png_name(&path)?;
+            files::write_png(&path, size, rgba)
         };
-        write().map_err(told)
+        write().map_err(told).map(|()| path)
     }
 
-    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<(), String> {
-        files::check_output(path, &[]).and_then(|()| path_file::write(path, camera_path)).map(drop).map_err(told)
+    fn write_path(&self, path: &Path, camera_path: &CameraPath) -> Result<PathBuf, String> {
+        self.write(path, |path| {
+            files::check_output(path, &[])?;
+            path_file::write(path, camera_path).map(drop)
+        })
     }
 
-    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<(), String> {
+    fn write_scene(&self, path: &Path, scene: &SceneDescription) -> Result<PathBuf, String> {
         let models: Vec<&Path> = scene.models.iter().map(|model| model.file.as_path()).collect();
-        files::check_output(path, &models).and_then(|()| scene_file::write(path, scene)).map_err(told)
+        self.write(path, |path| {
+            files::check_output(path, &models)?;
+            scene_file::write(path, scene)
+        })
     }
+}
+
+/// The name, or the next one that no file has.
+fn free_name(path: &Path) -> PathBuf {
+    let mut free = path.to_owned();
+    while let (true, Some(name)) = (free.exists(), free.file_name()) {
+        free = free.with_file_name(next_name(&name.to_string_lossy()));
+    }
+    free
 }
 
 /// As the window says it.
@@ -68,6 +87,19 @@ fn told(error: CliError) -> String {
 }
 
 impl Files {
+    pub(crate) fn new(build: BuildOptions) -> Self {
+        Self { build, written: Mutex::default() }
+    }
+
+    /// Writes under that name where there is no such file or it is one of ours, else under the next one that is free.
+    fn write(&self, path: &Path, write: impl FnOnce(&Path) -> Result<(), CliError>) -> Result<PathBuf, String> {
+        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        let path = if written.contains(path) { path.to_owned() } else { free_name(path) };
+        write(&path).map_err(told)?;
+        written.insert(path.clone());
+        Ok(path)
+    }
+
     fn open_any(&self, path: &Path, work: &Work) -> Result<Opened, CliError> {
         if path.is_dir() {
             return view_folder::list(path).map(Opened::Folder);
@@ -102,8 +134,10 @@ impl Files {
         if original.is_some() {
             cache::note_place(path, &container);
         }
+        let unit = files::open_container(&container)?.read_metadata().ok();
+        let unit = unit.and_then(|mut metadata| metadata.options.remove("units"));
         let file = files::open_built(&container)?;
-        Ok(Model { source: path.to_owned(), file, original, placements })
+        Ok(Model { source: path.to_owned(), file, original, unit, placements })
     }
 
     /// Builds a raw model, and shows what can be had of it sooner.
@@ -123,7 +157,7 @@ impl Files {
                     && !is_late()
                 {
                     let (source, placements) = (path.to_owned(), placements.to_vec());
-                    let model = Model { source, file: Arc::new(file).into(), original: None, placements };
+                    let model = Model { source, file: Arc::new(file).into(), original: None, unit: None, placements };
                     work.preview(Preview { model, points });
                 }
             });
@@ -219,6 +253,7 @@ fn phase_of(step: &str) -> (&str, Option<f32>, Option<Duration>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gigalod_geom::Pose;
 
     #[test]
     fn lines_of_a_build_say_how_far_it_is() {
@@ -226,5 +261,28 @@ mod tests {
         assert_eq!(phase_of("read 12 %, 3 s left"), ("read", Some(0.12), seconds(3)));
         assert_eq!(phase_of("sort runs 100 %, 0 s left"), ("sort runs", Some(1.0), seconds(0)));
         assert_eq!(phase_of("write"), ("write", None, None));
+    }
+
+    #[test]
+    fn what_was_there_before_is_never_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let contents = |name: &str| std::fs::read(at(name)).unwrap();
+        for name in ["a-1.png", "a-2.png", "a.json"] {
+            std::fs::write(at(name), name).unwrap();
+        }
+        let files = Files::new(BuildOptions::within(1 << 30));
+        let size = ImageSize { width: 2, height: 1 };
+        let picture = |name: &str| files.write_picture(&at(name), size, &[200; 8]).unwrap();
+        assert_eq!([picture("a-1.png"), picture("a-1.png")], [at("a-3.png"), at("a-4.png")]);
+        // A path may be saved again by who saved it.
+        let pose = Pose { t: 0.0, eye: DVec3::X, target: DVec3::ZERO };
+        let path = CameraPath { up: DVec3::Y, fov_deg: 40.0, frames: vec![pose] };
+        let written: Vec<PathBuf> =
+            ["a.json", "b.json", "b.json"].map(|name| files.write_path(&at(name), &path).unwrap()).into();
+        assert_eq!(written, [at("a-2.json"), at("b.json"), at("b.json")]);
+        for name in ["a-1.png", "a-2.png", "a.json"] {
+            assert_eq!(contents(name), name.as_bytes());
+        }
     }
 }

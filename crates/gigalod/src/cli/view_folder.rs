@@ -3,6 +3,8 @@
 use super::cache;
 use super::error::CliError;
 use gigalod_view::{Entry, Folder, Kind};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Names of raw models end in one of these, and perhaps in `.gz`.
@@ -30,8 +32,22 @@ fn entry_of(path: PathBuf) -> Option<Entry> {
         return Some(Entry { path, kind: Kind::Folder, bytes: 0 });
     }
     let kind = kind_of(&name).filter(|_| metadata.is_file())?;
-    let kind = if kind == Kind::Raw && cache::was_built(&path) { Kind::Built } else { kind };
+    let kind = match kind {
+        Kind::Raw if cache::was_built(&path) => Kind::Built,
+        // Much else is JSON: a city may be.
+        Kind::Path if !is_camera_path(&path) => return None,
+        kind => kind,
+    };
     Some(Entry { path, kind, bytes: metadata.len() })
+}
+
+/// Whether the first name in a JSON object is one of a camera path's.
+fn is_camera_path(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(256).read_to_end(&mut start));
+    let name = start.trim_ascii_start().strip_prefix(b"{").map(<[u8]>::trim_ascii_start);
+    let names: [&[u8]; 3] = [b"\"up\"", b"\"fov\"", b"\"frames\""];
+    read.is_ok() && name.is_some_and(|name| names.iter().any(|known| name.starts_with(known)))
 }
 
 /// By its name in small letters.
@@ -54,9 +70,11 @@ mod tests {
     #[test]
     fn a_folder_lists_what_can_be_shown() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["b.ply.gz", "a.GLOD", "scene.toml", "notes.md", ".hidden.ply", "c.laz", "path.json"] {
+        for name in ["b.ply.gz", "a.GLOD", "scene.toml", "notes.md", ".hidden.ply", "c.laz"] {
             std::fs::write(folder.path().join(name), "12345").unwrap();
         }
+        std::fs::write(folder.path().join("path.json"), " {\n  \"fov\": 40.0").unwrap();
+        std::fs::write(folder.path().join("city.json"), "{\"type\": \"CityJSON\"").unwrap();
         std::fs::create_dir(folder.path().join("z.ply")).unwrap();
         let found = list(folder.path()).unwrap();
         assert!(found.path.is_absolute());
@@ -70,7 +88,7 @@ mod tests {
             ("a.GLOD", Kind::Model, 5),
             ("b.ply.gz", Kind::Raw, 5),
             ("c.laz", Kind::Raw, 5),
-            ("path.json", Kind::Path, 5),
+            ("path.json", Kind::Path, 16),
             ("scene.toml", Kind::Scene, 5),
         ];
         assert_eq!(entries, expected.map(|(name, kind, bytes)| (name.to_string(), kind, bytes)));

@@ -1,4 +1,5 @@
-//! Something to look at while a raw model is being built: points of it, as even as the file's order has them.
+//! Something to look at while a raw model is being built: points of it, as even as the file's order has them. Of each run of
+//! vertices it is any one: where every so-manieth were taken, those of a grid or a scanner could be the same few columns of all rows.
 //!
 //! Goes in: a raw model, read once from front to back, a mesh no farther than its vertices. Comes out: a small model of its own, built
 //! as a cloud of points, in memory. How far it is from the model is not known.
@@ -54,7 +55,7 @@ pub(crate) fn of(
     Ok(Some((file.map_err(|error| CliError::format(path, &error))?, number)))
 }
 
-/// Every so-manieth vertex of a stream.
+/// One vertex of each run of a stream.
 struct Sample {
     points: VertexBatch,
     /// Whether they have been handed out.
@@ -81,7 +82,8 @@ fn sample(
         }
         let vertices = &batch.vertices;
         for at in 0..vertices.positions.len() {
-            if (seen + at as u64).is_multiple_of(every) {
+            let number = seen + at as u64;
+            if number % every == any_number(number / every, every) % every {
                 points.positions.push(vertices.positions[at]);
                 points.normals.extend(vertices.normals.get(at));
                 points.colors.extend(vertices.colors.get(at));
@@ -89,23 +91,31 @@ fn sample(
         }
         seen += vertices.positions.len() as u64;
         while points.positions.len() > extent.most_points {
-            thin_out(&mut points.positions);
-            thin_out(&mut points.normals);
-            thin_out(&mut points.colors);
             every *= 2;
+            thin_out(&mut points.positions, every);
+            thin_out(&mut points.normals, every);
+            thin_out(&mut points.colors, every);
         }
     }
     let (attributes, up, unit) = (stream.attributes(), stream.up_axis(), stream.unit());
     Ok((seen >= extent.least_vertices).then_some(Sample { points, is_done: false, attributes, up, unit }))
 }
 
-/// Keeps every second.
-fn thin_out<T>(all: &mut Vec<T>) {
-    let mut at = 0;
-    all.retain(|_| {
-        at += 1;
-        at % 2 == 1
-    });
+/// Keeps one of each two: which, depends on their place and on `every`.
+fn thin_out<T>(all: &mut Vec<T>, every: u64) {
+    let mut places = 0_u64..;
+    all.retain(|_| places.next().is_some_and(|at| at % 2 == any_number(at / 2, every) % 2));
+}
+
+/// A number that looks random, for the run of that place and length.
+///
+/// # Source
+/// Steele, Lea & Flood, *Fast Splittable Pseudorandom Number Generators*, OOPSLA 2014, figure 16 (variant 13).
+fn any_number(place: u64, length: u64) -> u64 {
+    let mut mixed = place.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ length.wrapping_mul(0xD1B5_4A32_D192_ED03);
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    mixed ^ (mixed >> 31)
 }
 
 impl ModelStream for Sample {

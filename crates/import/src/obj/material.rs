@@ -11,6 +11,8 @@ use std::collections::HashMap;
 const MOST: usize = 1 << 16;
 /// Most libraries that are looked for.
 const MOST_LIBRARIES: u32 = 256;
+/// What is less opaque is not there: half of 255, as where glTF says nothing else.
+const HALF_OPAQUE: u8 = 127;
 /// Longest name in bytes.
 const MAX_NAME_BYTES: usize = 1024;
 
@@ -66,12 +68,13 @@ impl Materials {
         input.has(1)?;
         let mut lines = Lines::continued(&input);
         let mut material: Option<Material> = None;
+        let mut mask = None;
         while let Some(line) = lines.next(&mut input)? {
             let Some((word, rest)) = text::word(line) else { continue };
             match (word, &mut material) {
                 (b"newmtl", _) => {
                     let next = Material::plain(name(&rest[..rest.len().min(MAX_NAME_BYTES)]));
-                    self.insert(material.replace(next));
+                    self.insert(material.replace(next), mask.take());
                 }
                 (b"Kd", Some(material)) => {
                     if let Ok((color, _)) = numbers::<3>(rest) {
@@ -79,17 +82,22 @@ impl Materials {
                     }
                 }
                 (b"map_Kd", Some(material)) => (material.texture, material.mapping) = texture(rest),
+                (b"map_d", Some(_)) => mask = texture(rest).0,
                 _ => {}
             }
         }
-        self.insert(material);
+        self.insert(material, mask);
         Ok(())
     }
 
-    fn insert(&mut self, material: Option<Material>) {
-        if let Some(material) = material
+    /// `mask` is the picture that `map_d` names: leaves are cut out of the picture that also has their colours.
+    fn insert(&mut self, material: Option<Material>, mask: Option<Texture>) {
+        if let Some(mut material) = material
             && self.library.len() < MOST
         {
+            if mask.is_some() && mask == material.texture {
+                material.alpha_cutoff = Some(HALF_OPAQUE);
+            }
             self.library.entry(material.name.clone()).or_insert(material);
         }
     }

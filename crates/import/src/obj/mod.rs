@@ -13,8 +13,9 @@
 //!   `fo` is an old word for `f`.
 //! * **Texture coordinates** are streamed as they come; corners name them. Normals (`vn`) are left to the builder, which takes
 //!   them from the faces: those of corners are read only to check that they are numbers.
-//! * **Materials**: `usemtl` names; from `mtllib`, where the file can be had, `Kd` and `map_Kd`. A library that is missing or
-//!   wrong changes nothing but looks, so it is not an error: then materials have names only. `mtllib` comes before its use.
+//! * **Materials**: `usemtl` names; from `mtllib`, where the file can be had, `Kd` and `map_Kd`; `map_d` where it names the same
+//!   picture, whose opacity then cuts leaves out. A library that is missing or wrong changes nothing but looks, so it is not an
+//!   error: then materials have names only. `mtllib` comes before its use.
 //! * **Everything else** (groups, smoothing, lines, points, curves) is skipped; so are unknown words.
 
 mod face;

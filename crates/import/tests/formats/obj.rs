@@ -116,17 +116,20 @@ fn materials_come_from_libraries() {
         match name {
             "my colours.mtl" => Ok(Box::new(Cursor::new(
                 "# made\nnewmtl red\nKd 1 0 0.5\nnewmtl picture\nmap_Kd -o 0.5 0 -clamp on -s 2 brick wall.png\n\
-                 newmtl last\nKd spectral file\nillum 2\n",
+                 newmtl last\nKd spectral file\nillum 2\n\
+                 newmtl leaf\nmap_d leaf.png\nmap_Kd leaf.png\nnewmtl pane\nmap_Kd pane.png\nmap_d mask.png\n\
+                 newmtl bark\nmap_Kd mask.png\n",
             ))),
             "a.mtl" => Ok(Box::new(Cursor::new("newmtl a\nKd 0 1 0\n"))),
             _ => Err(io::ErrorKind::NotFound.into()),
         }
     };
     let text = "mtllib my colours.mtl\nmtllib b.mtl a.mtl\nv 0 0 0\nusemtl picture\nf 1 1 1\nusemtl red\nf 1 1 1\n\
-        usemtl unknown\nf 1 1 1\nusemtl a\nf 1 1 1\nusemtl last\nf 1 1 1\n";
+        usemtl unknown\nf 1 1 1\nusemtl a\nf 1 1 1\nusemtl last\nf 1 1 1\n\
+        usemtl leaf\nf 1 1 1\nusemtl pane\nf 1 1 1\nusemtl bark\nf 1 1 1\n";
     let mut stream = open_with(Box::new(Cursor::new(text)), Box::new(side)).expect("it is a good file");
     let all = read_all(&mut *stream, &mut |_, _| {}).expect("it is a good file");
-    assert_eq!(all.corners.materials, [0, 1, 2, 3, 4]);
+    assert_eq!(all.corners.materials, [0, 1, 2, 3, 4, 5, 6, 7]);
     let material = |name: &str, color, texture: Option<&str>| Material {
         color,
         texture: texture.map(|name| Texture::File(name.to_owned())),
@@ -139,9 +142,13 @@ fn materials_come_from_libraries() {
         material("unknown", [255; 3], None),
         material("a", [0, 255, 0], None),
         material("last", [255; 3], None),
+        // Cut out of the picture of its colours; a picture of its own says nothing about them.
+        Material { alpha_cutoff: Some(127), ..material("leaf", [255; 3], Some("leaf.png")) },
+        material("pane", [255; 3], Some("pane.png")),
+        material("bark", [255; 3], Some("mask.png")),
     ];
     assert_eq!(stream.materials(), expected);
     // Without its library, the same model with names only.
     let model = read_with(Box::new(Cursor::new(text)), Box::new(gigalod_import::NoSideFiles)).expect("still good");
-    assert_eq!(model.material_names, ["picture", "red", "unknown", "a", "last"]);
+    assert_eq!(model.material_names, ["picture", "red", "unknown", "a", "last", "leaf", "pane", "bark"]);
 }

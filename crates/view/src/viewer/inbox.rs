@@ -58,9 +58,13 @@ impl Viewer {
                     self.notice(&format!("{name}: cancelled"), now);
                     self.previews_of(job).into_iter().for_each(|key| self.remove(key));
                 }
-                Finished::Wrote(path, Ok(())) => {
+                Finished::Wrote(asked, Ok(path)) => {
                     self.tally.written.push(path.display().to_string());
-                    self.notice(&format!("written: {}", path.display()), now);
+                    let why = match asked == path {
+                        true => String::new(),
+                        false => format!(", as {} was there already", asked.display()),
+                    };
+                    self.notice(&format!("written: {}{why}", path.display()), now);
                 }
                 Finished::Wrote(_, Err(error)) => self.notice_error(&error),
             }

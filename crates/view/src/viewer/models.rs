@@ -13,6 +13,19 @@ use crate::picker::Question;
 use crate::settings::FirstLook;
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera};
+use gigalod_runtime::Similarity;
+
+/// Around a model, wherever it stands; world space.
+fn bounds_of(model: &Model) -> Aabb {
+    let corners = model.file.bounds().corners();
+    let place = |at: &Similarity| corners.map(|corner| at.position + at.rotation * (corner * at.scale));
+    Aabb::of(model.placements.iter().flat_map(place))
+}
+
+/// As its file says; none where it is shown larger or smaller.
+fn unit_of(model: &Model) -> Option<&str> {
+    model.unit.as_deref().filter(|_| model.placements.iter().all(|place| place.scale == 1.0))
+}
 
 impl Viewer {
     /// Puts a model on the stage.
@@ -54,21 +67,37 @@ impl Viewer {
 
     /// Around all models; world space.
     pub(crate) fn bounds(&self) -> Aabb {
-        let corners = self.models.iter().flat_map(|Staged { model, .. }| {
-            let corners = model.file.bounds().corners();
-            let place = move |at: &gigalod_runtime::Similarity| {
-                let at = *at;
-                corners.map(|corner| at.position + at.rotation * (corner * at.scale))
-            };
-            model.placements.iter().flat_map(place)
-        });
-        Aabb::of(corners)
+        self.models.iter().map(|staged| bounds_of(&staged.model)).fold(Aabb::EMPTY, Aabb::union)
+    }
+
+    /// Looks at one model, from the side that the camera is on.
+    pub(crate) fn look_at(&mut self, key: ModelKey, now: f64) {
+        self.leave_path(now);
+        if let Some(staged) = self.models.iter().find(|staged| staged.key == key) {
+            self.navigation.look_at(bounds_of(&staged.model), self.size);
+            (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
+        }
+    }
+
+    /// What a length of 1 is, where all models agree: a symbol such as `m`.
+    pub(crate) fn unit(&self) -> Option<&str> {
+        let (first, rest) = self.models.split_first()?;
+        let unit = unit_of(&first.model)?;
+        rest.iter().all(|staged| unit_of(&staged.model) == Some(unit)).then_some(unit)
     }
 
     /// Which way is up.
     pub(crate) fn up(&self) -> UpAxis {
         let first = self.models.first().map(|staged| std::slice::from_ref(&staged.model));
         self.scene_up.unwrap_or(up_of(first.unwrap_or_default()))
+    }
+
+    /// Takes this way for up, whatever models say, and looks at everything.
+    pub(crate) fn stand_up(&mut self, up: UpAxis, now: f64) {
+        self.leave_path(now);
+        self.scene_up = Some(up);
+        self.navigation.stand_up(up, self.size);
+        (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
     }
 
     /// Looks at everything, from where the options say.

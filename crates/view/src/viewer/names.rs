@@ -36,8 +36,8 @@ fn stem_of(model: &Path) -> String {
     Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// `statue-1.png` → `statue-2.png`; a name without a number gets one.
-fn next_name(name: &str) -> String {
+/// What comes after a file's name: `statue-1.png` → `statue-2.png`; a name without a number gets one.
+pub fn next_name(name: &str) -> String {
     let path = Path::new(name);
     let extension = path.extension().map(|extension| format!(".{}", extension.to_string_lossy())).unwrap_or_default();
     let stem = name.strip_suffix(&extension).unwrap_or(name);
