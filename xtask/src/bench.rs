@@ -5,6 +5,7 @@
 
 mod building;
 mod drawing;
+mod hybrid;
 mod importing;
 
 use crate::figures::{self, Row};
@@ -30,8 +31,12 @@ struct Scope<'a> {
 /// A heading, and what fills its table.
 type Section = (&'static str, fn(&Bench, Scope<'_>, &mut Vec<Row>) -> Result<()>);
 
-const SECTIONS: [Section; 3] =
-    [("importing", importing::rows), ("building", building::rows), ("drawing", drawing::rows)];
+const SECTIONS: [Section; 4] = [
+    ("importing", importing::rows),
+    ("building", building::rows),
+    ("drawing", drawing::rows),
+    ("hybrid", hybrid::rows),
+];
 
 pub(crate) fn bench(arguments: &[String]) -> Result<()> {
     let mut scope = Scope { large: false, only: None };
@@ -40,7 +45,7 @@ pub(crate) fn bench(arguments: &[String]) -> Result<()> {
         match argument {
             "--large" => scope.large = true,
             "--only" => scope.only = Some(rest.next().context("--only: expected a section")?),
-            _ => bail!("usage: cargo xtask bench [--large] [--only importing|building|drawing]"),
+            _ => bail!("usage: cargo xtask bench [--large] [--only importing|building|drawing|hybrid]"),
         }
     }
     setup::system()?;

@@ -74,7 +74,7 @@ impl Soak {
         let count = triangles.to_string();
         self.0.gigalod(&["synth", "statue", "--triangles", &count, "--colors", "-o", "killed.ply"])?;
         let begun = Instant::now();
-        self.0.gigalod(&["build", "killed.ply", "-o", "whole.glod", "--memory", "64MiB"])?;
+        self.0.gigalod(&["build", "killed.ply", "--as", "splats", "-o", "whole.glod", "--memory", "64MiB"])?;
         let took = begun.elapsed();
         println!("left alone it takes {:.1} s", took.as_secs_f64());
         let [whole, killed, work] =
@@ -83,8 +83,17 @@ impl Soak {
         let mut random = Random(0x2545_f491_4f6c_dd1d);
         let (mut kills, mut completed, mut found) = (0, 0, Vec::new());
         while kills < KILLS {
-            let mut build =
-                self.0.command(&["build", "killed.ply", "-o", "killed.glod", "--memory", "64MiB", "--resume"]);
+            let mut build = self.0.command(&[
+                "build",
+                "killed.ply",
+                "--as",
+                "splats",
+                "-o",
+                "killed.glod",
+                "--memory",
+                "64MiB",
+                "--resume",
+            ]);
             let mut build = build.stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
             // From the first phase to the last, at any moment of it.
             let phases = kills * (PHASES.len() + 1) / KILLS;
@@ -106,7 +115,17 @@ impl Soak {
                 completed += 1;
             }
         }
-        self.0.gigalod(&["build", "killed.ply", "-o", "killed.glod", "--memory", "64MiB", "--resume"])?;
+        self.0.gigalod(&[
+            "build",
+            "killed.ply",
+            "--as",
+            "splats",
+            "-o",
+            "killed.glod",
+            "--memory",
+            "64MiB",
+            "--resume",
+        ])?;
         ensure!(same(&whole, &killed)?, "after {kills} kills: other bytes");
         ensure!(!work.exists(), "{} is left", work.display());
         found.sort_unstable();
@@ -131,7 +150,7 @@ impl Soak {
         let made = self.0.gigalod(&["synth", "statue", "--triangles", &triangles.to_string(), "-o", name])?;
         let input_bytes = number(&made, "bytes");
         println!("{:.0} MiB of scan", input_bytes / MIB);
-        let build = self.0.command(&["build", name, "-o", "out.glod", "--memory", memory]);
+        let build = self.0.command(&["build", name, "--as", "splats", "-o", "out.glod", "--memory", memory]);
         let begun = Instant::now();
         let (report, Peaks { memory: peak_memory, disk }) = watch::run(build, &self.0.folder.join(".out.glod.build"))?;
         let minutes = begun.elapsed().as_secs_f64() / 60.0;

@@ -1,20 +1,19 @@
-//! Draws a model as splats beside what a ray tracer sees of it, and their difference.
+//! Draws a model beside what a ray tracer sees of it, and their difference.
 //!
-//! `cargo run --release --example beside_truth -- MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX]]`
+//! `cargo run --release --example beside_truth -- MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid]]]`
 //!
-//! Left: splats. Middle: the ray tracer. Right: their difference, four times enlarged; holes red, fat green. Prints the judge's
+//! Left: as it is drawn. Middle: the ray tracer. Right: their difference, four times enlarged; holes red, fat green. Prints the judge's
 //! counts and the image metrics.
 
 use anyhow::{Context, Result};
-use gigalod::build::{NoProgress, Options, splats};
-use gigalod::format::splats::SplatFile;
+use gigalod::build::{NoProgress, Options, hybrid, splats};
 use gigalod::format::{Container, FileStore};
 use gigalod::geom::{Camera, ImageSize};
 use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Lighting, Look, Renderer};
 use gigalod::runtime::residency::InlineLoader;
 use gigalod::runtime::splats::MATERIAL_SRGB;
-use gigalod::runtime::{Fineness, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::runtime::{Fineness, Instance, ModelFile, Residency, Scene, Similarity, ViewId};
 use gigalod::verify;
 use gigalod_reference::judge::{Drawn, judge};
 use gigalod_reference::raytrace::supersampled_coverage;
@@ -28,7 +27,7 @@ const SIZE: ImageSize = ImageSize { width: 800, height: 600 };
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, out, rest @ ..] = &arguments[..] else {
-        anyhow::bail!("usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX]]");
+        anyhow::bail!("usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid]]]");
     };
     let number = |at: usize, default: f64| rest.get(at).map_or(Ok(default), |text: &String| text.parse::<f64>());
     let (orbit_deg, zoom, threshold_px) = ([number(0, 0.0)?, number(1, 0.0)?], number(2, 1.0)?, number(3, 1.0)?);
@@ -37,9 +36,10 @@ fn main() -> Result<()> {
     let folder = tempfile::tempdir()?;
     let built = folder.path().join("model.glod");
     let stream = gigalod::import::open(Box::new(File::open(model)?))?;
-    splats::build(stream, &Options::default(), &NoProgress, &built)?;
-    let file = Arc::new(SplatFile::open(Container::open(Arc::new(FileStore::open(&built)?))?)?);
-    let up = file.skeleton().root().up;
+    let builder = if rest.get(4).is_some_and(|kind| kind == "hybrid") { hybrid::build } else { splats::build };
+    builder(stream, &Options::default(), &NoProgress, &built)?;
+    let file = ModelFile::open(Container::open(Arc::new(FileStore::open(&built)?))?)?;
+    let up = file.up();
     let mut residency = Residency::new(4 << 30, Box::new(InlineLoader::default()));
     let id = residency.add(file);
     let mut scene = Scene::new(residency);

@@ -17,7 +17,7 @@ pub(super) fn rows(bench: &Bench, scope: Scope<'_>, rows: &mut Vec<Row>) -> Resu
 /// Some builds; the one in the middle by processor time.
 fn build(bench: &Bench, model: &str, threads: &str) -> Result<Value> {
     let runs = (0..RUNS)
-        .map(|_| bench.0.gigalod(&["build", model, "-o", "out.glod", "--threads", threads]))
+        .map(|_| bench.0.gigalod(&["build", model, "--as", "splats", "-o", "out.glod", "--threads", threads]))
         .collect::<Result<Vec<_>>>()?;
     Ok(middle(runs, "cpu_seconds"))
 }
@@ -50,7 +50,7 @@ fn splats(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
     let per_leaf = number(&colored, "output_bytes") / number(&colored, "leaves");
     rows.push(at_most("file, statue with colours".into(), per_leaf, 6.5, "bytes a leaf (goal 5)"));
 
-    bench.0.gigalod(&["build", statue, "-o", "statue7.glod"])?;
+    bench.0.gigalod(&["build", statue, "--as", "splats", "-o", "statue7.glod"])?;
     let decoded = bench.example("gigalod-format", "decode_speed", &["statue7.glod"])?;
     let rate = number(&decoded, "m_nodes_per_second");
     rows.push(at_least("decoding, statue, one thread".into(), rate, 20.0, "M nodes a second"));
@@ -59,7 +59,7 @@ fn splats(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
 
 fn large(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
     let statue = bench.statue100()?;
-    let run = bench.0.gigalod(&["build", statue, "-o", "statue100.glod", "--memory", "512MiB"])?;
+    let run = bench.0.gigalod(&["build", statue, "--as", "splats", "-o", "statue100.glod", "--memory", "512MiB"])?;
     let peak = number(&run, "peak_memory_bytes") / f64::from(1 << 20);
     rows.push(at_most("peak anonymous memory, 100 M triangles, --memory 512MiB".into(), peak, 640.0, "MiB"));
     let rate = number(&run, "leaves") / number(&run, "cpu_seconds") / 1e6;

@@ -59,7 +59,7 @@ fn models(bench: &Bench, scope: Scope<'_>) -> Result<Vec<Model>> {
     }
     for model in &models {
         // Anew, since the format may have changed.
-        bench.0.gigalod(&["build", &model.input, "-o", model.file])?;
+        bench.0.gigalod(&["build", &model.input, "--as", "splats", "-o", model.file])?;
     }
     Ok(models)
 }

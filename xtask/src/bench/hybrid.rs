@@ -1,0 +1,120 @@
+//! Hybrid: speed of building, size of files, what is measured of the errors they claim, and what is drawn.
+
+use super::{Bench, Scope, data};
+use crate::figures::{Row, at_least, at_most, plain};
+use crate::program::number;
+use anyhow::{Context, Result};
+use serde_json::Value;
+
+/// A model: its name, its file, and whether all of its nodes are measured.
+type Model = (&'static str, String, bool);
+
+pub(super) fn rows(bench: &Bench, scope: Scope<'_>, rows: &mut Vec<Row>) -> Result<()> {
+    let scan = |name, file| data(file).map(|path| (name, path.to_string_lossy().into_owned(), true));
+    let mut models: Vec<Model> = [
+        scan("dragon", "scans/dragon_vrip.ply.gz"),
+        scan("bunny", "scans/bun_zipper.ply"),
+        scan("laurana, colours", "scans/laurana.ply"),
+        scan("dragon, non-manifold", "scans/dragon_vrip_res2.ply.gz"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    models.push(("statue, 7 M", bench.statue7()?.into(), scope.large));
+    models
+        .extend(bench.dragons("dragons7.ply", "7M")?.map(|file| ("dragon, replicated, 7 M", file.into(), scope.large)));
+    for model in &models {
+        built(bench, model, rows)?;
+    }
+    if scope.large {
+        large(bench, rows)?;
+    }
+    if let Some((name, file, _)) = models.first().filter(|(name, ..)| *name == "dragon") {
+        quality(bench, name, file, rows)?;
+        drawn(bench, name, file, rows)?;
+    }
+    Ok(())
+}
+
+fn build(bench: &Bench, model: &str, out: &str, appearance: &str, threads: &str) -> Result<Value> {
+    let options = ["--as", "hybrid", "--appearance", appearance, "--threads", threads];
+    bench.0.gigalod(&[&["build", model, "-o", out], &options[..]].concat())
+}
+
+fn built(bench: &Bench, (name, model, is_measured): &Model, rows: &mut Vec<Row>) -> Result<()> {
+    // Bytes of normals are in both: a file without appearance keeps them for shading.
+    for (appearance, least, most_bytes) in [("on", 0.06, 4.5), ("off", 0.10, 2.5)] {
+        let one = build(bench, model, "hybrid.glod", appearance, "1")?;
+        let two = build(bench, model, "hybrid.glod", appearance, "2")?;
+        let triangles = number(&one["input"], "triangles");
+        let rate = triangles / number(&one, "cpu_seconds") / 1e6;
+        let figure = format!("{name}, appearance {appearance}");
+        rows.push(at_least(format!("build, {figure}"), rate, least, "M triangles a CPU-second"));
+        let ratio = number(&two, "seconds") / number(&one, "seconds");
+        rows.push(at_most(format!("two threads' wall time to one's, {figure}"), ratio, 0.65, ""));
+        let bytes = number(&one, "output_bytes") / triangles;
+        rows.push(at_most(format!("file, {figure}"), bytes, most_bytes, "bytes a triangle"));
+        if *is_measured {
+            let verified = bench.0.gigalod(&["verify", "hybrid.glod", "--against", model])?;
+            let measured = &verified["measured"];
+            let figure = format!("violations, {figure}");
+            let ratios = format!(
+                "(worst measured to stored {:.2}, median {:.2})",
+                number(measured, "worst_ratio"),
+                number(measured, "median_ratio"),
+            );
+            rows.push(at_most(figure, number(measured, "violations"), 0.0, &ratios));
+        }
+    }
+    Ok(())
+}
+
+fn large(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
+    let statue = bench.statue100()?;
+    let out = "hybrid100.glod";
+    let run = bench.0.gigalod(&["build", statue, "-o", out, "--as", "hybrid", "--memory", "1GiB"])?;
+    let triangles = number(&run["input"], "triangles");
+    let peak = number(&run, "peak_memory_bytes") / f64::from(1 << 20);
+    rows.push(at_most("peak anonymous memory, 100 M triangles, --memory 1GiB".into(), peak, 1152.0, "MiB"));
+    let rate = triangles / number(&run, "cpu_seconds") / 1e6;
+    rows.push(at_least("build, statue, 100 M".into(), rate, 0.06, "M triangles a CPU-second"));
+    let bytes = number(&run, "output_bytes") / triangles;
+    rows.push(at_most("file, statue, 100 M".into(), bytes, 4.5, "bytes a triangle"));
+    Ok(())
+}
+
+/// Distances at exact shares of the triangles, without appearance.
+fn quality(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<()> {
+    let out = "hybrid_geometry.glod";
+    bench.0.gigalod(&["build", model, "-o", out, "--as", "hybrid", "--appearance", "off", "--tmax", "1024"])?;
+    let lines = bench.lines("gigalod", "hybrid_levels", &[out, model])?;
+    let last: Value = serde_json::from_str(lines.last().context("no line")?)?;
+    for (share, key, most) in [("1/8", "rms_at_1_8", 6.5e-5), ("1/64", "rms_at_1_64", 4.0e-4)] {
+        let rms = number(&last, key) * 1e5;
+        rows.push(at_most(format!("rms at {share} of the triangles, {name}"), rms, most * 1e5, "e-5 of the diagonal"));
+    }
+    Ok(())
+}
+
+/// Primitives and time, in one run.
+fn drawn(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<()> {
+    for (kind, out) in [("hybrid", "hybrid.glod"), ("splats", "splats.glod")] {
+        bench.0.gigalod(&["build", model, "-o", out, "--as", kind])?;
+    }
+    let ways: [(&str, &str, &[&str]); 3] = [
+        ("hybrid at 0.5 px", "hybrid.glod", &["--error", "0.5"]),
+        ("splats at 0.5 px", "splats.glod", &["--error", "0.5"]),
+        ("everything", "hybrid.glod", &["--full"]),
+    ];
+    for (way, file, options) in ways {
+        for orbit in ["0,0,0.5", "0,0,1", "30,20,4"] {
+            let view = ["render", file, "-o", "drawn.png", "--size", "640x480", "--orbit", orbit];
+            let run = bench.0.gigalod(&[&view[..], options].concat())?;
+            let counts = &run["drawn"];
+            let primitives = number(counts, "triangles") + number(counts, "points");
+            let text = format!("{:.3} M primitives, {:.0} ms", primitives / 1e6, number(&run, "frame_ms"));
+            rows.push(plain(format!("{name}, --orbit {orbit}, {way}"), text));
+        }
+    }
+    Ok(())
+}
