@@ -25,6 +25,8 @@ mod overlay;
 mod patch;
 mod pieces;
 mod points;
+#[cfg(test)]
+mod proof_tests;
 mod quadric;
 mod round;
 mod simplify;

@@ -28,8 +28,10 @@ pub(super) struct Limit {
 
 /// Weight of planes that hold borders in place, compared to faces.
 const BORDER_WEIGHT: f64 = 2.0;
-/// Weight of a vertex' own place, so that flat places have one least point.
+/// Weight of an edge's middle while its best place is looked for, so that flat places have one.
 const PLACE_WEIGHT: f64 = 1e-5;
+/// Weight of an edge's length in the order of operations: of those that cost nothing, short edges go first.
+const LENGTH_WEIGHT: f64 = 1e-7;
 /// Operations are not tried whose quadric says that planes are so many times the limit away, in the mean of squares.
 const HOPELESS: f64 = 1.0;
 /// Edges longer than so many times the limit are not tried where nothing can be laid flat.
@@ -168,9 +170,8 @@ impl Work {
             let doubled = (at[1] - at[0]).cross(at[2] - at[0]);
             let area = 0.5 * doubled.length();
             let plane = doubled.try_normalize().map(|normal| Quadric::plane(normal, at[0], area));
-            for (corner, at) in face.corners.into_iter().zip(at) {
-                let own = Quadric::point(at, area * PLACE_WEIGHT);
-                let sum = quadrics[corner as usize].plus(&own);
+            for corner in face.corners {
+                let sum = quadrics[corner as usize];
                 let mut sum = plane.map_or(sum, |plane| sum.plus(&plane));
                 sum.area += area;
                 quadrics[corner as usize] = sum;
@@ -220,7 +221,9 @@ impl Work {
         if cost > area * (HOPELESS * self.limit.error).powi(2) {
             return None;
         }
-        Some(Reverse((cost.to_bits(), a, b, self.stamps[a as usize], self.stamps[b as usize])))
+        let [p, q] = [a, b].map(|vertex| self.surface.vertices[vertex as usize].at);
+        let order = cost + LENGTH_WEIGHT * area * (p - q).length_squared();
+        Some(Reverse((order.to_bits(), a, b, self.stamps[a as usize], self.stamps[b as usize])))
     }
 
     /// The best place for an edge to collapse to, and its cost.
@@ -236,14 +239,14 @@ impl Work {
             _ => {}
         }
         let ends = [quadric.at(at_a), quadric.at(at_b)];
+        let middle = (at_a + at_b) * 0.5;
         if fixed == [false, false]
-            && let Some(place) = quadric.least()
+            && let Some(place) = quadric.plus(&Quadric::point(middle, quadric.area * PLACE_WEIGHT)).least()
         {
             let length = (at_b - at_a).length_squared();
-            let middle = (at_a + at_b) * 0.5;
             if (place - middle).length_squared() <= length {
                 let cost = quadric.at(place);
-                if cost <= ends[0].min(ends[1]) {
+                if cost <= ends[0].min(ends[1]) * 1.01 {
                     return (Operation { gone: a, kept: b, moved: Some(self.between(a, b, place)) }, cost);
                 }
             }
