@@ -128,11 +128,11 @@ fn merge(spots: &mut Vec<Spot>, limit: f64) {
 /// What of a patch is drawn as points in this node.
 #[derive(Default)]
 pub(super) struct Small {
-    /// For each face, whether its corners take its place.
-    pub(super) is_small: Vec<bool>,
+    /// For each face whose corners take its place, the largest distance of its points to the nearest of them.
+    pub(super) reaches: Vec<Option<f64>>,
     /// For each vertex, whether it is a point.
     pub(super) is_point: Vec<bool>,
-    /// Largest distance of a point of such a face to a corner.
+    /// The largest of these distances.
     pub(super) reach: f64,
 }
 
@@ -147,20 +147,21 @@ impl Small {
         };
         let fits = |face: &Face| {
             let farthest = face.corners.map(&moved).into_iter().fold(0.0, f64::max);
-            let geo = f64::from(face.geo) + farthest + reach(face);
-            geo * geo + f64::from(face.app).powi(2) <= room * room
+            let reach = reach(face);
+            let geo = f64::from(face.geo) + farthest + reach;
+            (geo * geo + f64::from(face.app).powi(2) <= room * room).then_some(reach)
         };
-        let mut small = Self { is_small: patch.faces.iter().map(fits).collect(), ..Self::default() };
+        let mut small = Self { reaches: patch.faces.iter().map(fits).collect(), ..Self::default() };
         let mut around = vec![0u32; patch.vertices.len()];
-        for (face, _) in patch.faces.iter().zip(&small.is_small).filter(|(_, is_small)| **is_small) {
+        for (face, _) in patch.faces.iter().zip(&small.reaches).filter(|(_, reach)| reach.is_some()) {
             face.corners.iter().for_each(|corner| around[*corner as usize] += 1);
         }
         small.is_point = vec![false; patch.vertices.len()];
-        for (face, is_small) in patch.faces.iter().zip(&mut small.is_small) {
-            *is_small &= face.corners.iter().all(|corner| around[*corner as usize] >= LEAST_AROUND);
-            if *is_small {
+        for (face, reach) in patch.faces.iter().zip(&mut small.reaches) {
+            *reach = reach.filter(|_| face.corners.iter().all(|corner| around[*corner as usize] >= LEAST_AROUND));
+            if let Some(reach) = *reach {
                 face.corners.iter().for_each(|corner| small.is_point[*corner as usize] = true);
-                small.reach = small.reach.max(reach(face));
+                small.reach = small.reach.max(reach);
             }
         }
         small

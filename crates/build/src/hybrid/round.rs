@@ -44,8 +44,8 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     for (number, face) in patch.faces.iter().enumerate() {
         let corners = face.corners.map(|corner| steps[corner as usize]);
         let geo = f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max);
-        if small.is_small.get(number) == Some(&true) {
-            errors.add(up(geo + small.reach), face.app);
+        if let Some(Some(reach)) = small.reaches.get(number) {
+            errors.add(up(geo + reach), face.app);
             cone.add(corners);
             continue;
         }
