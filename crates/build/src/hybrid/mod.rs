@@ -127,9 +127,15 @@ pub fn build(
         stage = match stage {
             Stage::Start => {
                 let mut input = input.take().expect("a build starts once");
-                Stage::Read(mesh::read(&mut *input, &plan, &phases)?)
+                let mesh = mesh::read(&mut *input, &plan, &phases)?;
+                if mesh.triangles.len() == 0 {
+                    return Err(BuildError::NoTriangles);
+                }
+                if options.only_suited && mesh.paint.is_some() {
+                    return Err(BuildError::Painted);
+                }
+                Stage::Read(mesh)
             }
-            Stage::Read(mesh) if mesh.triangles.len() == 0 => return Err(BuildError::NoTriangles),
             Stage::Read(mesh) => {
                 if mesh.paint.is_some() {
                     progress.note("textures are left out; --as splats keeps them");

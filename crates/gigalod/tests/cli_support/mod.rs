@@ -118,30 +118,37 @@ pub(crate) struct Model {
 }
 
 impl Model {
-    fn make(name: &str, triangles: &str, seed: &str) -> Self {
+    /// Built as what suits it, which is hybrid, or as `kind`.
+    fn make(name: &str, triangles: &str, seed: &str, kind: &str) -> Self {
         let (ply, glod) = (folder().join(name).with_extension("ply"), folder().join(name).with_extension("glod"));
         run!["synth", "statue", "--triangles", triangles, "--seed", seed, "-o", ply].done();
-        run!["build", ply, "-o", glod].done();
+        run!["build", ply, "-o", glod, "--as", kind].done();
         Self { ply, glod }
     }
 }
 
-/// A small statue.
+/// A small statue, as the command builds it where nobody says otherwise: hybrid.
 pub(crate) fn statue() -> &'static Model {
     static STATUE: OnceLock<Model> = OnceLock::new();
-    STATUE.get_or_init(|| Model::make("statue", "20k", "1"))
+    STATUE.get_or_init(|| Model::make("statue", "20k", "1", "auto"))
 }
 
-/// Another one.
-pub(crate) fn other_statue() -> &'static Model {
+/// The same, as splats.
+pub(crate) fn splat_statue() -> &'static Model {
     static STATUE: OnceLock<Model> = OnceLock::new();
-    STATUE.get_or_init(|| Model::make("other", "20k", "2"))
+    STATUE.get_or_init(|| Model::make("splats", "20k", "1", "splats"))
 }
 
-/// A statue of many pages.
-pub(crate) fn larger_statue() -> &'static Model {
+/// Another one, as splats.
+pub(crate) fn other_splat_statue() -> &'static Model {
     static STATUE: OnceLock<Model> = OnceLock::new();
-    STATUE.get_or_init(|| Model::make("larger", "200k", "1"))
+    STATUE.get_or_init(|| Model::make("other", "20k", "2", "splats"))
+}
+
+/// A statue of many pages, as splats.
+pub(crate) fn larger_splat_statue() -> &'static Model {
+    static STATUE: OnceLock<Model> = OnceLock::new();
+    STATUE.get_or_init(|| Model::make("larger", "200k", "1", "splats"))
 }
 
 /// True where there is a graphics adapter. Where there is none, says so; with `REQUIRE_GPU` set that is a failure.
