@@ -49,10 +49,7 @@ impl Site {
         let up = options.up.unwrap_or(input.up_axis());
         let unit = options.unit.or(input.unit());
         let mut influential = own;
-        influential.extend([
-            ("as".into(), kind.name().into()),
-            ("up".into(), format!("{up:?}").to_lowercase()),
-        ]);
+        influential.extend([("as".into(), kind.name().into()), ("up".into(), format!("{up:?}").to_lowercase())]);
         influential.extend(unit.map(|unit| ("units".into(), unit.symbol().into())));
         let reference_system = input.reference_system().map(|system| ReferenceSystem {
             name: system.name.clone(),

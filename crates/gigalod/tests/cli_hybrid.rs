@@ -35,7 +35,7 @@ fn a_camera_path_leads_around_a_hybrid_file() {
     run!["synth", "path", "orbit", "--around", file, "-o", path, "--seconds", "1"].done();
     let made: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     let frames = made["frames"].as_array().unwrap();
-    assert_eq!(frames.len(), 30);
+    assert_eq!(frames.len(), 31, "both ends");
     for frame in frames {
         let target = |axis: usize| frame["target"][axis].as_f64().unwrap();
         assert!((target(0) - 10.5).abs() < 1.0 && (target(1) + 19.5).abs() < 1.0, "{frame}");

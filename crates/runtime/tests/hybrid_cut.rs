@@ -325,7 +325,9 @@ fn lines_are_drawn_over_borders_but_not_where_all_neighbours_are_leaves_of_one_l
 fn records_that_lie_end_in_a_picture_that_says_so() {
     let honest = Octree::sphere(5, false);
     let inner = honest.records.iter().rposition(|record| record.children > 0).unwrap();
-    let lies: [(&str, fn(&mut NodeRecord, u32)); 6] = [
+    /// What it says of a record, and its number.
+    type Lie = fn(&mut NodeRecord, u32);
+    let lies: [(&str, Lie); 6] = [
         ("its own child", |record, own| record.first_child = own),
         ("its ancestor's parent", |record, _| record.first_child = 0),
         ("beyond the last", |record, _| record.first_child = u32::MAX - 2),

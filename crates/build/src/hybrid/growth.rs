@@ -3,12 +3,12 @@
 //! In: all pieces. Out: all nodes, in the order in which they were made, and a list of them. What is in memory at a time has the size that
 //! the plan allows; how much that is changes nothing about the nodes. Between any two sets the state can be kept and continued from.
 
+use super::Shape;
 use super::cell::{Cell, MOST_LEVEL};
 use super::nodes::Nodes;
 use super::octree::{self, Piece, Raised};
-use super::patch::{Face, Patch, Vertex};
+use super::patch::{Face, Patch, Spot, Vertex};
 use super::pieces::Facts;
-use super::Shape;
 use crate::BuildError;
 use crate::progress::Phases;
 use crate::splats::plan::MemoryPlan;
@@ -135,13 +135,15 @@ impl Growth {
         let of = |what: &str| format!("{what}{}-{}", self.sets, self.done);
         let mut spools = self.nodes.secure(&place, &of("list"))?;
         let (mut vertices, mut faces) = (Spool::named(&place, &of("vertices"))?, Spool::named(&place, &of("faces"))?);
+        let mut spots = Spool::named(&place, &of("spots"))?;
         let mut sizes = Vec::new();
         for patch in &self.patches {
             vertices.push(&patch.vertices)?;
             faces.push(&patch.faces)?;
-            sizes.push([patch.vertices.len(), patch.faces.len()]);
+            spots.push(&patch.spots)?;
+            sizes.push([patch.vertices.len(), patch.faces.len(), patch.spots.len()]);
         }
-        spools.extend([vertices.secure()?, faces.secure()?]);
+        spools.extend([vertices.secure()?, faces.secure()?, spots.secure()?]);
         let mut tasks = Vec::new();
         for task in &self.tasks {
             tasks.push(match task {
@@ -164,18 +166,20 @@ impl Growth {
     pub(super) fn load(work: &Work, state: &serde_json::Value) -> io::Result<Self> {
         let odd = || io::Error::new(io::ErrorKind::InvalidData, "the journal says what no builder writes");
         let tasks: Vec<Kept> = serde_json::from_value(state["tasks"].clone()).map_err(|_| odd())?;
-        let sizes: Vec<[usize; 2]> = serde_json::from_value(state["sizes"].clone()).map_err(|_| odd())?;
+        let sizes: Vec<[usize; 3]> = serde_json::from_value(state["sizes"].clone()).map_err(|_| odd())?;
         let [sets, done]: [u64; 2] = serde_json::from_value(state["numbers"].clone()).map_err(|_| odd())?;
         let of = |what: &str| format!("{what}{sets}-{done}");
         let vertices: Spool<Vertex> = Spool::reopen(work, &of("vertices"))?;
         let faces: Spool<Face> = Spool::reopen(work, &of("faces"))?;
+        let spots: Spool<Spot> = Spool::reopen(work, &of("spots"))?;
         let mut patches = Vec::new();
-        let mut from = [0; 2];
-        for [vertex_count, face_count] in sizes {
+        let mut from = [0; 3];
+        for [vertex_count, face_count, spot_count] in sizes {
             let mut patch = Patch::default();
             vertices.read_vec(from[0], vertex_count, &mut patch.vertices)?;
             faces.read_vec(from[1], face_count, &mut patch.faces)?;
-            from = [from[0] + vertex_count as u64, from[1] + face_count as u64];
+            spots.read_vec(from[2], spot_count, &mut patch.spots)?;
+            from = [from[0] + vertex_count as u64, from[1] + face_count as u64, from[2] + spot_count as u64];
             patches.push(patch);
         }
         let task = |Kept { level, code, set, children }: Kept| {

@@ -24,6 +24,7 @@ mod octree;
 mod overlay;
 mod patch;
 mod pieces;
+mod points;
 mod quadric;
 mod round;
 mod simplify;
@@ -89,7 +90,6 @@ impl Shape {
         self.edge / (1u64 << level) as f64 / f64::from(self.resolution) - most_moved
     }
 }
-
 
 /// What there is after each step.
 enum Stage {

@@ -9,7 +9,7 @@ use super::cell::{Cell, MOST_LEVEL};
 use super::patch::{Face, Patch, Vertex};
 use super::round::{self, Made};
 use super::simplify::{Limit, simplify};
-use super::{Shape, weld, zip};
+use super::{Shape, points, weld, zip};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -87,7 +87,7 @@ pub(super) fn split(pieces: &[Piece], cell: Cell, shape: &Shape) -> [Vec<Piece>;
 
 fn leaf(pieces: &[Piece], cell: Cell, shape: &Shape) -> Raised {
     let patch = weld::patch_of(pieces);
-    let made = round::round(&patch, cell, shape);
+    let made = round::round(&patch, cell, shape, round::Place::Leaf);
     Raised { patch, nodes: vec![made] }
 }
 
@@ -103,15 +103,16 @@ pub(super) fn join(children: Vec<Raised>, cell: Cell, shape: &Shape) -> Raised {
     let mut patch = weld::gather(patches);
     zip::zip(&mut patch, limit);
     smooth(&mut patch, limit);
-    let patch = simplify(patch, Limit { error: limit, keeps_looks: shape.keeps_looks });
-    nodes.push(round::round(&patch, cell, shape));
+    let mut patch = simplify(patch, Limit { error: limit, keeps_looks: shape.keeps_looks });
+    points::shrink(&mut patch, limit);
+    nodes.push(round::round(&patch, cell, shape, round::Place::Above));
     Raised { patch, nodes }
 }
 
 /// Normals of vertices of which all triangles are smaller than the error become those of their surroundings: what is too small to be
 /// seen would flicker (hybrid paper, section 3.1).
 fn smooth(patch: &mut Patch, limit: f64) {
-    let Patch { vertices, faces } = patch;
+    let Patch { vertices, faces, .. } = patch;
     let mut is_small = vec![true; vertices.len()];
     let mut sums = vec![Vec3::ZERO; vertices.len()];
     let length = |a: &Vertex, b: &Vertex| (a.at - b.at).length();

@@ -31,11 +31,25 @@ pub(crate) struct Face {
     pub(crate) app: f32,
 }
 
+/// A point that stands for small things.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(crate) struct Spot {
+    pub(crate) vertex: Vertex,
+    /// Bounds the distance to anything that it stands for; model units.
+    pub(crate) geo: f32,
+    pub(crate) app: f32,
+    /// How far around it there was surface; model units.
+    pub(crate) reach: f32,
+    pub(crate) unused: u32,
+}
+
 /// Surface of one cell.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Patch {
     pub(crate) vertices: Vec<Vertex>,
     pub(crate) faces: Vec<Face>,
+    pub(crate) spots: Vec<Spot>,
 }
 
 impl Face {

@@ -3,6 +3,7 @@
 use super::Shape;
 use super::cell::Cell;
 use super::patch::{Patch, Vertex, total};
+use super::points::Small;
 use super::simplify::up;
 use gigalod_format::hybrid::{NodeRecord, Page};
 use glam::{DVec3, Vec3};
@@ -15,77 +16,135 @@ pub(super) struct Made {
     pub(super) page: Page,
 }
 
+/// Where a node stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Below all others: it keeps its triangles.
+    Leaf,
+    /// Small triangles may be points.
+    Above,
+}
+
 /// Rounds a patch to the grid of its cell's level.
-pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape) -> Made {
+pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> Made {
     let step = shape.step(cell.level);
-    let steps: Vec<[i32; 3]> =
-        patch.vertices.iter().map(|vertex| (vertex.at / step).round().to_array().map(|x| x as i32)).collect();
-    let moved = |vertex: u32| {
-        let rounded = DVec3::from_array(steps[vertex as usize].map(f64::from)) * step;
-        (rounded - patch.vertices[vertex as usize].at).length()
+    let grid = |at: DVec3| (at / step).round().to_array().map(|x| x as i32);
+    let steps: Vec<[i32; 3]> = patch.vertices.iter().map(|vertex| grid(vertex.at)).collect();
+    let away = |steps: [i32; 3], at: DVec3| (DVec3::from_array(steps.map(f64::from)) * step - at).length();
+    let moved = |vertex: u32| away(steps[vertex as usize], patch.vertices[vertex as usize].at);
+    let room = cell.edge(shape.edge) / f64::from(shape.resolution);
+    let small = match place {
+        Place::Leaf => Small::default(),
+        Place::Above => Small::of(patch, room, moved),
     };
-    let mut names = vec![u32::MAX; patch.vertices.len()];
-    let mut used: Vec<u32> = Vec::new();
-    let mut page = Page::default();
-    let (mut error_geo, mut error_total) = (0.0f32, 0.0f32);
+    let mut errors = Errors::default();
     let mut cone = Cone::default();
-    for face in &patch.faces {
-        let geo = up(f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max));
-        error_geo = error_geo.max(geo);
-        error_total = error_total.max(total(geo, face.app));
-        let [a, b, c] = face.corners.map(|corner| steps[corner as usize]);
+    let mut names = Names { names: vec![u32::MAX; patch.vertices.len()], used: Vec::new() };
+    let mut page = Page::default();
+    for (number, face) in patch.faces.iter().enumerate() {
+        let corners = face.corners.map(|corner| steps[corner as usize]);
+        let geo = f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max);
+        if small.is_small.get(number) == Some(&true) {
+            errors.add(up(geo + small.reach), face.app);
+            cone.add(corners);
+            continue;
+        }
+        errors.add(up(geo), face.app);
+        let [a, b, c] = corners;
         if a == b || b == c || c == a {
             continue;
         }
-        cone.add([a, b, c]);
-        let corners = face.corners.map(|corner| {
-            let name = &mut names[corner as usize];
-            if *name == u32::MAX {
-                *name = used.len() as u32;
-                used.push(corner);
-            }
-            *name
-        });
-        page.triangles.push(corners);
+        cone.add(corners);
+        page.triangles.push(face.corners.map(|corner| names.of(corner)));
     }
-    let min = used.iter().fold([i32::MAX; 3], |min, vertex| {
-        let at = steps[*vertex as usize];
-        [0, 1, 2].map(|axis| min[axis].min(at[axis]))
-    });
-    let min = if used.is_empty() { [0; 3] } else { min };
+    let mut placed: Vec<([i32; 3], Vertex)> = Vec::with_capacity(names.used.len());
+    placed.extend(names.used.iter().map(|vertex| (steps[*vertex as usize], patch.vertices[*vertex as usize])));
+    let vertices = placed.len();
+    for (vertex, is_point) in small.is_point.iter().enumerate() {
+        if *is_point {
+            placed.push((steps[vertex], patch.vertices[vertex]));
+        }
+    }
+    let mut reach = small.reach;
+    for spot in &patch.spots {
+        let at = grid(spot.vertex.at);
+        let away = away(at, spot.vertex.at);
+        errors.add(up(f64::from(spot.geo) + away), spot.app);
+        cone.add_any();
+        reach = reach.max(f64::from(spot.reach) + away);
+        placed.push((at, spot.vertex));
+    }
+    let points = placed.len() - vertices;
+    let (min_steps, extent_steps) = fill(&mut page, &placed, shape);
+    let (cone_axis, cone_sine) = cone.finish();
+    let record = NodeRecord {
+        level: cell.level,
+        first_child: 0,
+        children: 0,
+        min_steps,
+        extent_steps,
+        error_geo: errors.geo,
+        error_total: errors.total,
+        cone_axis,
+        cone_sine,
+        spacing: if points > 0 { up(2.0 * reach) } else { 0.0 },
+        vertices: vertices as u32,
+        triangles: page.triangles.len() as u32,
+        points: points as u32,
+        borders: 0,
+        bytes: 0,
+        checksum: 0,
+    };
+    Made { cell, record, page }
+}
+
+/// Puts vertices into a page; returns the smallest place, and the extent from there.
+fn fill(page: &mut Page, placed: &[([i32; 3], Vertex)], shape: &Shape) -> ([i32; 3], [u16; 3]) {
+    let Some((first, _)) = placed.first() else { return ([0; 3], [0; 3]) };
+    let min = placed.iter().fold(*first, |min, (at, _)| [0, 1, 2].map(|axis| min[axis].min(at[axis])));
     let mut extent = [0u16; 3];
-    for vertex in &used {
-        let at = steps[*vertex as usize];
+    for (at, Vertex { normal, color, .. }) in placed {
         let from = [0, 1, 2].map(|axis| (at[axis] - min[axis]) as u16);
         extent = [0, 1, 2].map(|axis| extent[axis].max(from[axis]));
         page.positions.push(from);
-        let Vertex { normal, color, .. } = &patch.vertices[*vertex as usize];
         page.normals.push(octahedral(*normal, shape.normal_bits));
         if shape.has_colors {
             let [r, g, b] = color.to_array().map(|value| value.round() as u8);
             page.colors.push([r, g, b, 255]);
         }
     }
-    let (cone_axis, cone_sine) = cone.finish();
-    let record = NodeRecord {
-        level: cell.level,
-        first_child: 0,
-        children: 0,
-        min_steps: min,
-        extent_steps: extent,
-        error_geo,
-        error_total,
-        cone_axis,
-        cone_sine,
-        spacing: 0.0,
-        vertices: used.len() as u32,
-        triangles: page.triangles.len() as u32,
-        points: 0,
-        borders: 0,
-        bytes: 0,
-        checksum: 0,
-    };
-    Made { cell, record, page }
+    (min, extent)
+}
+
+/// Largest errors so far.
+#[derive(Default)]
+struct Errors {
+    geo: f32,
+    total: f32,
+}
+
+impl Errors {
+    fn add(&mut self, geo: f32, app: f32) {
+        self.geo = self.geo.max(geo);
+        self.total = self.total.max(total(geo, app));
+    }
+}
+
+/// Numbers of vertices in the page, in order of their first use.
+struct Names {
+    names: Vec<u32>,
+    used: Vec<u32>,
+}
+
+impl Names {
+    fn of(&mut self, vertex: u32) -> u32 {
+        let name = &mut self.names[vertex as usize];
+        if *name == u32::MAX {
+            *name = self.used.len() as u32;
+            self.used.push(vertex);
+        }
+        *name
+    }
 }
 
 /// Code of a normal on the octahedron: u and v, `bits` each, u | v << 16.
@@ -104,9 +163,15 @@ pub(super) fn octahedral(normal: Vec3, bits: u32) -> u32 {
 struct Cone {
     normals: Vec<Vec3>,
     sum: Vec3,
+    is_any: bool,
 }
 
 impl Cone {
+    /// What may face anywhere.
+    fn add_any(&mut self) {
+        self.is_any = true;
+    }
+
     fn add(&mut self, corners: [[i32; 3]; 3]) {
         let [a, b, c] = corners.map(|at| DVec3::from_array(at.map(f64::from)));
         if let Some(normal) = (b - a).cross(c - a).try_normalize() {
@@ -117,7 +182,7 @@ impl Cone {
 
     /// Axis and sine of the half-angle, rounded up.
     fn finish(self) -> ([f32; 3], f32) {
-        let Some(axis) = self.sum.try_normalize() else { return ([0.0, 0.0, 1.0], 1.0) };
+        let Some(axis) = self.sum.try_normalize().filter(|_| !self.is_any) else { return ([0.0, 0.0, 1.0], 1.0) };
         let least = self.normals.iter().fold(1.0f32, |least, normal| least.min(normal.dot(axis))) - 1e-5;
         let sine = if least > 0.0 { (1.0 - least * least).max(0.0).sqrt() + 1e-5 } else { 1.0 };
         (axis.to_array(), sine.min(1.0))

@@ -3,7 +3,7 @@
 //! Any faces whatever: non-manifold, degenerate, none of it matters here. What always holds: each face that is there is in the list
 //! of each of its vertices; lists may hold faces that are gone.
 
-use super::patch::{Face, Patch, Vertex};
+use super::patch::{Face, Patch, Spot, Vertex};
 
 /// End of a list.
 const END: u32 = u32::MAX;
@@ -18,16 +18,18 @@ pub(super) struct Surface {
     next: Vec<u32>,
     /// Faces that are there.
     pub(super) left: usize,
+    spots: Vec<Spot>,
 }
 
 impl Surface {
     pub(super) fn new(patch: Patch) -> Self {
-        let Patch { vertices, faces } = patch;
+        let Patch { vertices, faces, spots } = patch;
         let mut surface = Self {
             first: vec![END; vertices.len()],
             next: vec![END; faces.len() * 3],
             is_gone: vec![false; faces.len()],
             left: faces.len(),
+            spots,
             vertices,
             faces,
         };
@@ -48,11 +50,11 @@ impl Surface {
 
     /// What is left.
     pub(super) fn into_patch(self) -> Patch {
-        let Self { vertices, faces, is_gone, .. } = self;
+        let Self { vertices, faces, is_gone, spots, .. } = self;
         let mut gone = is_gone.into_iter();
         let mut faces = faces;
         faces.retain(|_| gone.next() == Some(false));
-        let mut patch = Patch { vertices, faces };
+        let mut patch = Patch { vertices, faces, spots };
         patch.compact();
         patch
     }

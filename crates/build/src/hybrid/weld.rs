@@ -44,7 +44,11 @@ impl Hasher for PlaceHasher {
 
 /// A patch of triangles as they were read: nothing is off yet.
 pub(super) fn patch_of(pieces: &[Piece]) -> Patch {
-    let mut patch = Patch { vertices: Vec::with_capacity(pieces.len() / 2), faces: Vec::with_capacity(pieces.len()) };
+    let mut patch = Patch {
+        vertices: Vec::with_capacity(pieces.len() / 2),
+        faces: Vec::with_capacity(pieces.len()),
+        spots: Vec::new(),
+    };
     let mut known: Hashed<[u32; 5], u32> = Hashed::default();
     for piece in pieces {
         let mut corners = [0; 3];
@@ -71,6 +75,7 @@ pub(super) fn gather(patches: Vec<Patch>) -> Patch {
     let mut all = Patch {
         vertices: Vec::with_capacity(patches.iter().map(|patch| patch.vertices.len()).sum()),
         faces: Vec::with_capacity(patches.iter().map(|patch| patch.faces.len()).sum()),
+        spots: patches.iter().flat_map(|patch| patch.spots.iter().copied()).collect(),
     };
     // The last vertex at a place, and for each the one before it at the same.
     let mut last: Hashed<[u64; 3], u32> = Hashed::default();

@@ -110,7 +110,7 @@ impl Grid {
 /// Vertices of borders that are nearest to each other become one.
 fn merge(patch: &mut Patch, edges: &[Edge], limit: f64) {
     let reach = REACH * limit;
-    let Patch { vertices, faces } = patch;
+    let Patch { vertices, faces, .. } = patch;
     // The shortest border edge at each vertex; infinite inside.
     let mut shortest = vec![f64::INFINITY; vertices.len()];
     for Edge { ends: [a, b], .. } in edges {
@@ -177,7 +177,7 @@ fn most_errors(vertices: usize, faces: &[Face]) -> Vec<f32> {
 fn insert(patch: &mut Patch, limit: f64) {
     let reach = REACH * limit;
     let mut edges = borders(&patch.faces);
-    let Patch { vertices, faces } = patch;
+    let Patch { vertices, faces, .. } = patch;
     let length = |edge: &Edge| (vertices[edge.ends[0] as usize].at - vertices[edge.ends[1] as usize].at).length();
     let mean = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;
     let mut grid = Grid::new(reach.max(mean));

@@ -48,6 +48,9 @@ pub struct PageRequest {
     pub benefit: f32,
 }
 
+/// Shared with the threads of a cut.
+type SharedSplats = Arc<PageTable<splats::Page>>;
+
 /// The pages of one file.
 struct FilePages {
     file: ModelFile,
@@ -140,7 +143,7 @@ impl Residency {
     }
 
     /// A splat file, its pages, and what to mark them with that are used now.
-    pub(crate) fn splats(&self, id: FileId) -> Option<(&Arc<splats::SplatFile>, &Arc<PageTable<splats::Page>>, u32)> {
+    pub(crate) fn splats(&self, id: FileId) -> Option<(&Arc<splats::SplatFile>, &SharedSplats, u32)> {
         match self.files.get(id.0 as usize) {
             Some(FilePages { file: ModelFile::Splats(file), table: Table::Splats(table) }) => {
                 Some((file, table, self.frame))

@@ -34,7 +34,8 @@ impl Octree {
         let (mut cells, mut records, mut pages) = (vec![(IVec3::ZERO, 0)], Vec::new(), Vec::new());
         let mut at = 0;
         while let Some(&(cell, level)) = cells.get(at) {
-            let is_inner = level + 1 < levels && (levels < 4 || level + 3 < levels || hash(cell, level) % 4 != 0);
+            let is_inner =
+                level + 1 < levels && (levels < 4 || level + 3 < levels || !hash(cell, level).is_multiple_of(4));
             let first_child = cells.len() as u32;
             if is_inner {
                 let below = (0..8).map(|corner| cell * 2 + IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2));
