@@ -2,7 +2,7 @@
 
 mod cli_support;
 
-use cli_support::{can_draw, crc32, names_in, splat_statue, statue};
+use cli_support::{can_draw, crc32, names_in, statue};
 use serde_json::Value;
 use std::fs::File;
 use std::io::Read;

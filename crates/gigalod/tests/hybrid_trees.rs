@@ -53,10 +53,11 @@ fn expect_the_same_bytes(model: &[u8], options: &Options) {
     }
 }
 
+/// With the smallest memory it does not fit, and is raised in several sets.
 #[test]
 fn neither_threads_nor_memory_change_what_is_built_of_a_statue() {
     let mut ply = Vec::new();
-    let options = StatueOptions { triangles: 300_000, seed: 9, colors: true, order: Order::Coherent };
+    let options = StatueOptions { triangles: 150_000, seed: 9, colors: true, order: Order::Coherent };
     write_statue(options, &mut ply, &mut |_, _| {}).unwrap();
     expect_the_same_bytes(&ply, &Options::default());
 }

@@ -117,7 +117,7 @@ pub fn build(
         ("tmax".to_string(), most_triangles.to_string()),
         ("appearance".to_string(), if options.keeps_looks { "on" } else { "off" }.to_string()),
     ]);
-    let in_memory = plan::fits_into_memory(options, &*input);
+    let in_memory = growth::fits_into_memory(options, &*input);
     let site = Site::open(&*input, options, (Kind::Hybrid, own), (plan::threads(options), in_memory), progress, out)?;
     let plan = MemoryPlan::new(options, site.place(), folder_of(&site.out));
 
