@@ -221,7 +221,12 @@ fn an_interrupted_build_of_several_goes_on_with_just_these() {
     // Without one, with another, with one more.
     let refused = |inputs: &[&Path], what: &str| {
         let mut build = cli_support::command();
-        build.arg("build").args(inputs).arg("-o").arg(&place.out).args(["--resume", "--json", "--memory", "64MiB", "--as", "splats"]);
+        build
+            .arg("build")
+            .args(inputs)
+            .arg("-o")
+            .arg(&place.out)
+            .args(["--resume", "--json", "--memory", "64MiB", "--as", "splats"]);
         let said = cli_support::Ran::of(build.output().unwrap()).failed(&place.out);
         assert!(said.contains("of another input") && said.contains(what), "{said}");
     };

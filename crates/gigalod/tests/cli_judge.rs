@@ -84,7 +84,8 @@ fn a_damaged_header_or_skeleton_is_an_error_everywhere() {
 fn info_tells_what_build_told_and_adds_up() {
     for model in [statue(), larger_splat_statue()] {
         let folder = tempfile::tempdir().unwrap();
-        let built = run!["build", model.ply, "-o", folder.path().join("a.glod"), "--as", "splats", "--json"].done().json();
+        let built =
+            run!["build", model.ply, "-o", folder.path().join("a.glod"), "--as", "splats", "--json"].done().json();
         let info = run!["info", model.glod, "--json"].done().json();
         for key in ["kind", "input", "options", "nodes", "levels", "leaves", "repeated"] {
             assert_eq!(info[key], built[key], "{key}");

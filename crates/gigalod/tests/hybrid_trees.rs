@@ -173,7 +173,8 @@ fn any_mesh_is_built_the_same_with_any_memory() {
     let one = Mesh { vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], triangles: vec![[0, 1, 2]] };
     let huge = Mesh { vertices: one.vertices.iter().map(|at| at.map(|x| (x - 0.2) * 1e6)).collect(), ..one.clone() };
     let needles = Mesh::grid(60, |column, row| [column as f64 * 1e-7, row as f64, (row % 3) as f64]);
-    let in_one_point = Mesh { vertices: vec![[3.0, 4.0, 5.0]; 30], triangles: (0..10).map(|t| [t, t + 10, t + 20]).collect() };
+    let in_one_point =
+        Mesh { vertices: vec![[3.0, 4.0, 5.0]; 30], triangles: (0..10).map(|t| [t, t + 10, t + 20]).collect() };
     let degenerate = Mesh {
         vertices: (0..300).map(dot).collect(),
         triangles: (0..298).flat_map(|t| [[t, t + 1, t + 2], [t, t, t + 1], [t, t, t]]).collect(),

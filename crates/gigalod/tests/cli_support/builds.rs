@@ -93,12 +93,11 @@ impl Place {
 
     /// Continues or begins a build that fails for want of room as soon as a file has more than so many bytes.
     pub(crate) fn build_within(&self, file_bytes: u64, input: &Path) -> Ran {
-        let script =
-            format!(
-                "trap '' XFSZ; ulimit -f {}; exec \"$0\" build --resume --json --as {} -o \"$@\"",
-                file_bytes / 512,
-                self.way.kind
-            );
+        let script = format!(
+            "trap '' XFSZ; ulimit -f {}; exec \"$0\" build --resume --json --as {} -o \"$@\"",
+            file_bytes / 512,
+            self.way.kind
+        );
         let mut shell = Command::new("sh");
         shell.arg("-c").arg(script).arg(env!("CARGO_BIN_EXE_gigalod")).arg(&self.out).arg(input).stdin(Stdio::null());
         let mut ran = Ran::of(shell.output().unwrap());
