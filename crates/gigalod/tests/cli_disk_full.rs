@@ -4,7 +4,7 @@
 mod cli_support;
 
 use cli_support::builds::{HYBRID, Place, SMALL_VERTICES, SPLATS, TRIES, Way, small};
-use cli_support::{Ran, names_in, statue};
+use cli_support::{Ran, names_in, statue, without_progress};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -154,7 +154,7 @@ fn expect_to_go_on_with_more_room(way: Way, growing_by: u64) {
             Ok(ran) => ran,
             Err(error) => return println!("skipped: no unshare: {error}"),
         };
-        let text = |suffix: &str| std::fs::read_to_string(said.with_extension(suffix)).unwrap();
+        let text = |suffix: &str| without_progress(&std::fs::read_to_string(said.with_extension(suffix)).unwrap());
         if !said.with_extension("status").exists() {
             return println!("skipped: no disk of its own: {}", String::from_utf8_lossy(&ran.stderr));
         }
