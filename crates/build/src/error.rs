@@ -17,6 +17,9 @@ pub enum BuildError {
     /// Points have no surface.
     #[error("no triangles, expected at least one; points become splats")]
     NoTriangles,
+    /// Refused for [`Options::only_suited`](crate::Options::only_suited).
+    #[error("materials colour the triangles, which splats can sample")]
+    Painted,
     /// Local space is `f32`.
     #[error("the model is {extent:e} units wide, expected at most 1e30")]
     TooWide {

@@ -44,6 +44,8 @@ pub struct Options {
     pub most_triangles: Option<u32>,
     /// Of hybrid models, `--appearance`: whether errors of shading and colour are bounded too, or geometry alone.
     pub keeps_looks: bool,
+    /// Of hybrid models: refuse what materials colour, for the caller to build as splats, instead of leaving the colours out.
+    pub only_suited: bool,
     /// What a length of 1 is; overrides what the input says. Coordinates stay as they are.
     pub unit: Option<LengthUnit>,
     /// What is built. Where it is given, a build that does not fit into memory can be continued by another process: what it
@@ -70,6 +72,7 @@ impl Default for Options {
             resolution: None,
             most_triangles: None,
             keeps_looks: true,
+            only_suited: false,
             unit: None,
             input: None,
             side: SideLog::default(),

@@ -118,7 +118,7 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 fn neither_threads_nor_memory_change_what_is_built() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("a.glod");
-    for options in [["--threads", "1"], ["--threads", "3"], ["--memory", "64MiB"], ["--as", "splats"]] {
+    for options in [["--threads", "1"], ["--threads", "3"], ["--memory", "64MiB"], ["--as", "hybrid"]] {
         run!["build", statue().ply, "-o", out, options[0], options[1]].done();
         assert_eq!(bytes(&out), bytes(&statue().glod), "{options:?}");
     }
@@ -129,19 +129,68 @@ fn build_reports_what_it_read_and_wrote() {
     let folder = tempfile::tempdir().unwrap();
     let (ply, out) = (folder.path().join("a.ply"), folder.path().join("a.glod"));
     let made = run!["synth", "statue", "--triangles", "6k", "-o", ply, "--json"].done().json();
-    let built = run!["build", ply, "-o", out, "--json"].done().json();
-    assert_eq!(built["kind"], "splats");
-    for count in ["triangles", "vertices", "points"] {
-        assert_eq!(built["input"][count], made[count], "{count}");
+    for kind in ["hybrid", "splats"] {
+        let ran = run!["build", ply, "-o", out, "--as", kind, "--json"].done();
+        let built = ran.json();
+        assert_eq!(built["kind"], kind);
+        for count in ["triangles", "vertices", "points"] {
+            assert_eq!(built["input"][count], made[count], "{count}");
+        }
+        let number = |value: &Value| value.as_u64().unwrap();
+        if kind == "splats" {
+            let once = number(&built["leaves"]) - number(&built["repeated"]);
+            assert_eq!(once, number(&made["vertices"]), "a leaf for each vertex");
+            assert!(ran.stderr.contains("vertices; splats are made for dense scans"), "{ran:?}");
+        } else {
+            assert_eq!((number(&built["repeated"]), &*ran.stderr), (0, ""), "nothing to warn of");
+        }
+        assert_eq!(made["bytes"], bytes(&ply).len());
+        assert_eq!(built["output_bytes"], bytes(&out).len());
+        let phases = built["phases"].as_array().unwrap().iter();
+        let phases: f64 = phases.map(|phase| phase["seconds"].as_f64().unwrap()).sum();
+        assert!(phases > 0.0 && phases <= built["seconds"].as_f64().unwrap(), "{built}");
+        assert!(built["peak_memory_bytes"].as_u64().unwrap() > 0);
     }
-    let number = |value: &Value| value.as_u64().unwrap();
-    let once = number(&built["leaves"]) - number(&built["repeated"]);
-    assert_eq!(once, number(&made["vertices"]), "a leaf for each vertex");
-    assert_eq!(made["bytes"], bytes(&ply).len());
-    assert_eq!(built["output_bytes"], bytes(&out).len());
-    let phases: f64 = built["phases"].as_array().unwrap().iter().map(|phase| phase["seconds"].as_f64().unwrap()).sum();
-    assert!(phases > 0.0 && phases <= built["seconds"].as_f64().unwrap(), "{built}");
-    assert!(built["peak_memory_bytes"].as_u64().unwrap() > 0);
+}
+
+/// What a file holds is known when all of it is read.
+#[test]
+fn what_turns_out_to_be_points_or_painted_becomes_splats() {
+    let folder = tempfile::tempdir().unwrap();
+    let (obj, out, other) = (folder.path().join("a.obj"), folder.path().join("a.glod"), folder.path().join("b.glod"));
+    let points: String = (0..6400).map(|at| format!("v {} {} {}\n", at % 80, at / 80, at % 7)).collect();
+    let square = |at: usize| format!("f {} {} {} {}\n", at + 1, at + 2, at + 82, at + 81);
+    let squares: String = (0..79 * 79).map(|at| square(at / 79 * 80 + at % 79)).collect();
+    std::fs::write(folder.path().join("a.mtl"), "newmtl red\nKd 1 0 0\n").unwrap();
+    for (text, kind, refused) in [
+        (points.clone(), "splats", true),
+        (format!("{points}{squares}"), "hybrid", false),
+        (format!("mtllib a.mtl\n{points}usemtl red\n{squares}"), "splats", false),
+    ] {
+        std::fs::write(&obj, text).unwrap();
+        for options in [&["--json"][..], &["--json", "--memory", "64MiB"]] {
+            let ran = cli_support::gigalod(
+                ["build", obj.to_str().unwrap(), "-o", out.to_str().unwrap()].iter().chain(options),
+            );
+            let ran = ran.done();
+            assert_eq!(ran.json()["kind"], kind);
+            assert!(!ran.stderr.contains("warning: ") && !ran.stderr.contains("note: "), "{ran:?}");
+            assert_eq!(ran.json()["options"]["as"], kind);
+        }
+        run!["build", obj, "-o", other, "--as", kind].done();
+        assert!(bytes(&out) == bytes(&other), "{kind}");
+        let ran = run!["build", obj, "-o", other, "--as", "hybrid", "--json"];
+        if refused {
+            assert_eq!(ran.failed(&obj), "no triangles, expected at least one; points become splats");
+            assert_eq!(ran.stderr.lines().count(), 1, "nothing to continue: {ran:?}");
+        } else {
+            ran.done();
+        }
+        assert_eq!(names_in(folder.path()), ["a.glod", "a.mtl", "a.obj", "b.glod"]);
+        // How finely to sample is a question of splats.
+        let sampled = run!["build", obj, "-o", other, "--spacing", "1", "--json"].done().json();
+        assert_eq!(sampled["kind"], "splats");
+    }
 }
 
 #[test]
@@ -170,7 +219,7 @@ fn synth_makes_the_number_of_triangles_asked_for_and_the_same_bytes_each_time() 
         assert!(bytes(&a) == bytes(&b), "{text}: the same bytes");
     }
     let out = folder.path().join("c.glod");
-    let built = run!["build", a, "-o", out, "--json"].done().json();
+    let built = run!["build", a, "-o", out, "--as", "splats", "--json"].done().json();
     within_1_percent(&serde_json::json!({ "triangles": built["input"]["triangles"] }), 15_000.0);
     assert_eq!(run!["verify", out, "--against", a, "--json"].done().json()["ok"], true);
 }

@@ -2,7 +2,7 @@
 
 mod cli_support;
 
-use cli_support::{Part, Ran, can_draw, command, damaged, names_in, other_statue, shape, statue};
+use cli_support::{Part, Ran, can_draw, command, damaged, names_in, other_splat_statue, shape, splat_statue, statue};
 use std::fs::File;
 use std::path::Path;
 use std::process::Stdio;
@@ -14,23 +14,34 @@ const SYNTH: &str = "{bytes output points seconds triangles vertices}";
 #[test]
 fn build_and_info_report_exactly_the_keys_of_the_contract() {
     let folder = tempfile::tempdir().unwrap();
-    let ran = run!["build", statue().ply, "-o", folder.path().join("a.glod"), "--json"].done();
-    assert_eq!(
-        shape(&ran.json()),
-        format!(
-            "{{cpu_seconds {INPUT} kind leaves levels nodes options{{..}} output_bytes peak_memory_bytes \
-             phases[{{name seconds}}] repeated resumed_after seconds}}"
-        )
-    );
-    let ran = run!["--json", "info", statue().glod].done();
-    assert_eq!(
-        shape(&ran.json()),
-        format!(
-            "{{attributes[] bounds{{max[] min[]}} bytes closed dicing {INPUT} kind leaves levels nodes options{{..}} \
-             per_level[{{bytes level max_error nodes points triangles}}] raw_bytes \
-             reference_system repeated units version}}"
-        )
-    );
+    for (kind, model, options) in [
+        ("splats", splat_statue(), serde_json::json!({ "as": "splats", "up": "y" })),
+        (
+            "hybrid",
+            statue(),
+            serde_json::json!({ "appearance": "on", "as": "hybrid", "res": "64", "tmax": "4096", "up": "y" }),
+        ),
+    ] {
+        let ran = run!["build", model.ply, "-o", folder.path().join("a.glod"), "--as", kind, "--json"].done();
+        assert_eq!(
+            shape(&ran.json()),
+            format!(
+                "{{cpu_seconds {INPUT} kind leaves levels nodes options{{..}} output_bytes peak_memory_bytes \
+                 phases[{{name seconds}}] repeated resumed_after seconds}}"
+            )
+        );
+        assert_eq!((&ran.json()["kind"], &ran.json()["options"]), (&kind.into(), &options));
+        let ran = run!["--json", "info", model.glod].done();
+        assert_eq!(
+            shape(&ran.json()),
+            format!(
+                "{{attributes[] bounds{{max[] min[]}} bytes closed dicing {INPUT} kind leaves levels nodes \
+                 options{{..}} per_level[{{bytes level max_error nodes points triangles}}] raw_bytes \
+                 reference_system repeated units version}}"
+            )
+        );
+        assert_eq!((&ran.json()["kind"], &ran.json()["options"]), (&kind.into(), &options));
+    }
 }
 
 #[test]
@@ -39,13 +50,15 @@ fn render_reports_exactly_the_keys_of_the_contract() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let ran = run!["render", statue().glod, "-o", folder.path().join("a.png"), "--size", "64x36", "--json"].done();
-    assert_eq!(
-        shape(&ran.json()),
-        "{adapter bytes_read converged cpu_bytes culled{backface frustum} drawn{lines nodes points triangles} frame_ms \
-         gpu_bytes height limited_by max_error_px problems[] select_ms threshold_px width}"
-    );
-    assert_eq!(ran.stderr, "");
+    for (model, threshold_px) in [(splat_statue(), 1.0), (statue(), 0.5)] {
+        let ran = run!["render", model.glod, "-o", folder.path().join("a.png"), "--size", "64x36", "--json"].done();
+        assert_eq!(
+            shape(&ran.json()),
+            "{adapter bytes_read converged cpu_bytes culled{backface frustum} drawn{lines nodes points triangles} \
+             frame_ms gpu_bytes height limited_by max_error_px problems[] select_ms threshold_px width}"
+        );
+        assert_eq!((ran.json()["threshold_px"].as_f64(), &*ran.stderr), (Some(threshold_px), ""));
+    }
 }
 
 #[test]
@@ -55,36 +68,39 @@ fn bench_reports_exactly_the_keys_of_the_contract() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("turn.json");
-    run!["synth", "path", "sudden-turn", "--around", statue().glod, "-o", path, "--seconds", "0.5"].done();
     const FRAMES: &str = "frames[{frame_ms max_error_px moved page_misses pixel_edge_px points select_ms t threshold_px triangles upload_bytes}]";
-    let ran = run!["bench", statue().glod, "--path", path, "--size", "64x36", "--json"].done();
-    let json = ran.json();
-    assert_eq!(
-        shape(&json),
-        format!("{{adapter {FRAMES} problems[] summary{{frame_ms_max frame_ms_median frame_ms_p95 paced rest}}}}")
-    );
-    assert_eq!(json["frames"].as_array().unwrap().len(), 16, "each pose once");
-    assert!(json["frames"].as_array().unwrap().iter().all(|frame| frame["threshold_px"] == 1.0));
-    let ran = run!["bench", statue().glod, "--path", path, "--size", "64x36", "--target-ms", "20", "--json"].done();
-    let json = ran.json();
-    assert_eq!(
-        shape(&json),
-        format!(
-            "{{adapter {FRAMES} problems[] summary{{frame_ms_max frame_ms_median frame_ms_p95 \
-             paced{{frame_ms_median frame_ms_p05 frame_ms_p95 frames}} \
-             rest{{frames seconds sign_changes threshold_px}}}}}}"
-        )
-    );
-    assert_eq!(json["summary"]["rest"]["threshold_px"], 1.0, "at rest all is drawn");
-    assert_eq!(json["summary"]["rest"]["sign_changes"], 0);
+    for (model, threshold_px) in [(splat_statue(), 1.0), (statue(), 0.5)] {
+        run!["synth", "path", "sudden-turn", "--around", model.glod, "-o", path, "--seconds", "0.5"].done();
+        let ran = run!["bench", model.glod, "--path", path, "--size", "64x36", "--json"].done();
+        let json = ran.json();
+        assert_eq!(
+            shape(&json),
+            format!("{{adapter {FRAMES} problems[] summary{{frame_ms_max frame_ms_median frame_ms_p95 paced rest}}}}")
+        );
+        let frames = json["frames"].as_array().unwrap();
+        assert_eq!(frames.len(), 16, "each pose once");
+        assert!(frames.iter().all(|frame| frame["threshold_px"] == threshold_px));
+        let ran = run!["bench", model.glod, "--path", path, "--size", "64x36", "--target-ms", "20", "--json"].done();
+        let json = ran.json();
+        assert_eq!(
+            shape(&json),
+            format!(
+                "{{adapter {FRAMES} problems[] summary{{frame_ms_max frame_ms_median frame_ms_p95 \
+                 paced{{frame_ms_median frame_ms_p05 frame_ms_p95 frames}} \
+                 rest{{frames seconds sign_changes threshold_px}}}}}}"
+            )
+        );
+        assert_eq!(json["summary"]["rest"]["threshold_px"], threshold_px, "at rest all is drawn");
+        assert_eq!(json["summary"]["rest"]["sign_changes"], 0);
+    }
 }
 
 #[test]
 fn verify_and_compare_report_exactly_the_keys_of_the_contract() {
-    let ran = run!["verify", statue().glod, "--json"].done();
+    let ran = run!["verify", splat_statue().glod, "--json"].done();
     assert_eq!(shape(&ran.json()), "{measured nodes_checked ok problems[]}");
     assert!(ran.json()["measured"].is_null(), "nothing to measure against");
-    let ran = run!["verify", statue().glod, "--against", statue().ply, "--json"].done();
+    let ran = run!["verify", splat_statue().glod, "--against", splat_statue().ply, "--json"].done();
     assert_eq!(shape(&ran.json()), "{measured{hausdorff rms violations worst_ratio} nodes_checked ok problems[]}");
     let folder = tempfile::tempdir().unwrap();
     let picture = folder.path().join("a.png");
@@ -236,7 +252,7 @@ fn help_and_version_are_asked_for_and_not_wrong_usage() {
 #[test]
 fn without_json_results_are_for_people_and_errors_are_on_standard_error() {
     let ran = run!["info", statue().glod].done();
-    assert!(serde_json::from_str::<serde_json::Value>(&ran.stdout).is_err() && ran.stdout.contains("splats"));
+    assert!(serde_json::from_str::<serde_json::Value>(&ran.stdout).is_err() && ran.stdout.contains("hybrid"));
     let ran = run!["info", "nowhere.glod"];
     assert_eq!((ran.status, &*ran.stdout), (1, ""));
     assert_eq!(ran.stderr.lines().count(), 1, "{ran:?}");
@@ -257,7 +273,7 @@ fn more_is_said_on_standard_error_only() {
 fn a_reader_that_goes_away_is_no_error() {
     let mut child = command()
         .args(["verify", "--json"])
-        .arg(&other_statue().glod)
+        .arg(&other_splat_statue().glod)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

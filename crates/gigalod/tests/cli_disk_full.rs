@@ -3,8 +3,8 @@
 
 mod cli_support;
 
-use cli_support::builds::{PHASES, Place, SMALL_VERTICES, TRIES, small};
-use cli_support::{Ran, names_in, statue};
+use cli_support::builds::{HYBRID, Place, SMALL_VERTICES, SPLATS, TRIES, Way, small};
+use cli_support::{Ran, names_in, statue, without_progress};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -26,7 +26,7 @@ fn expect_failure(place: &Place, ran: &Ran, journaled: Option<&str>) {
 
 #[test]
 fn files_that_cannot_grow_stop_a_build_in_each_phase_and_it_goes_on_when_they_can() {
-    let (place, ply, bytes) = small();
+    let (place, ply, bytes) = small(SPLATS);
     // Largest files: 12 bytes a vertex of positions, 24 of triangles; 24 of leaves; 27 of kept nodes; 5 of quantised ones; 3 of
     // pages.
     for (bytes_per_vertex, journaled) in [
@@ -66,9 +66,33 @@ fn files_that_cannot_grow_stop_a_build_in_each_phase_and_it_goes_on_when_they_ca
     }
 }
 
+#[test]
+fn so_does_a_hybrid_build() {
+    let (place, ply, bytes) = small(HYBRID);
+    // Largest files: 24 bytes a vertex of triangles; 120 of pieces, two a vertex; then pages.
+    for (bytes_per_vertex, journaled) in
+        [(0.5, None), (23.0, None), (60.0, Some("read")), (10.0, Some("read")), (110.0, Some("read"))]
+    {
+        let ran = place.build_within((SMALL_VERTICES as f64 * bytes_per_vertex) as u64, &ply);
+        expect_failure(&place, &ran, journaled);
+    }
+    let ran = place.resume(&ply).done();
+    assert_eq!((&ran.json()["resumed_after"], &*ran.stderr), (&"read".into(), ""));
+    assert!(std::fs::read(&place.out).unwrap() == bytes);
+    std::fs::remove_file(&place.out).unwrap();
+
+    if !leave_after(&place, &ply, "pieces") {
+        return println!("skipped: too fast to be killed after pieces");
+    }
+    let ran = place.build_within(SMALL_VERTICES, &ply);
+    expect_failure(&place, &ran, Some("pieces"));
+    assert_eq!(place.resume(&ply).done().json()["resumed_after"], "pieces");
+    assert!(std::fs::read(&place.out).unwrap() == bytes);
+}
+
 /// Leaves a build whose last finished phase is this one. False where the machine is too fast for that.
 fn leave_after(place: &Place, ply: &Path, name: &str) -> bool {
-    let phases = PHASES.iter().position(|phase| *phase == name).expect("a phase") + 1;
+    let phases = place.way.phases.iter().position(|phase| *phase == name).expect("a phase") + 1;
     for _ in 0..TRIES {
         let mut child = place.spawn(ply, &["--resume", "--threads", "1"]);
         if place.kill_after(&mut child, phases, Duration::ZERO).as_deref() == Some(name) {
@@ -94,9 +118,9 @@ fn a_build_in_memory_that_cannot_write_leaves_nothing() {
 
 /// On a small disk of its own, which only this process and its children see.
 const ON_A_DISK: &str = r#"
-    program=$0 disk=$1 ply=$2 kib=$3 said=$4
+    program=$0 disk=$1 ply=$2 kind=$3 kib=$4 said=$5
     mount -t tmpfs -o size=${kib}k tmpfs "$disk" || exit 77
-    build() { "$program" build "$ply" -o "$disk/a.glod" --memory 64MiB --resume "$@"; }
+    build() { "$program" build "$ply" -o "$disk/a.glod" --as $kind --memory 64MiB --resume "$@"; }
     build > "$said.out" 2> "$said.err"
     echo $? > "$said.status"
     ls -A "$disk" > "$said.names"
@@ -106,21 +130,31 @@ const ON_A_DISK: &str = r#"
 
 #[test]
 fn a_disk_that_is_full_is_an_error_and_with_more_room_the_build_goes_on() {
-    let (place, ply, bytes) = small();
+    expect_to_go_on_with_more_room(SPLATS, 8);
+}
+
+#[test]
+fn so_it_is_for_a_hybrid_build() {
+    expect_to_go_on_with_more_room(HYBRID, 40);
+}
+
+/// Tries larger and larger disks, each of so many bytes a vertex more.
+fn expect_to_go_on_with_more_room(way: Way, growing_by: u64) {
+    let (place, ply, bytes) = small(way);
     let disk = place.folder.path().join("disk");
     std::fs::create_dir(&disk).unwrap();
     let (mut failures, mut kept) = (0, 0);
     for step in 0..16 {
         let said = place.folder.path().join(format!("said{step}"));
         // From less than the positions take to more than all takes at once.
-        let kib = SMALL_VERTICES * (8 + 8 * step) / 1024;
+        let kib = SMALL_VERTICES * (8 + growing_by * step) / 1024;
         let mut shell = Command::new("unshare");
         shell.args(["-rm", "sh", "-c", ON_A_DISK, env!("CARGO_BIN_EXE_gigalod")]).args([&disk, &ply]);
-        let ran = match shell.arg(kib.to_string()).arg(&said).output() {
+        let ran = match shell.arg(way.kind).arg(kib.to_string()).arg(&said).output() {
             Ok(ran) => ran,
             Err(error) => return println!("skipped: no unshare: {error}"),
         };
-        let text = |suffix: &str| std::fs::read_to_string(said.with_extension(suffix)).unwrap();
+        let text = |suffix: &str| without_progress(&std::fs::read_to_string(said.with_extension(suffix)).unwrap());
         if !said.with_extension("status").exists() {
             return println!("skipped: no disk of its own: {}", String::from_utf8_lossy(&ran.stderr));
         }

@@ -29,7 +29,7 @@ fn statue(folder: &Path) -> PathBuf {
     synth.args(["synth", "statue", "--triangles", "60k", "--seed", "3", "--colors", "-o"]).arg(&ply);
     Ran::of(synth.output().unwrap()).done();
     let mut build = command();
-    build.arg("build").arg(&ply).arg("-o").arg(&glod);
+    build.arg("build").arg(&ply).arg("-o").arg(&glod).args(["--as", "splats"]);
     Ran::of(build.output().unwrap()).done();
     glod
 }

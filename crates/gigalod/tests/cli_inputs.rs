@@ -2,7 +2,7 @@
 
 mod cli_support;
 
-use cli_support::{names_in, other_statue, statue};
+use cli_support::{names_in, other_splat_statue, statue};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -52,7 +52,7 @@ fn a_folder_is_the_models_in_it_and_they_are_one_model() {
     std::fs::create_dir(&folder).unwrap();
     tiles(&folder);
     let [out, other] = ["a.glod", "b.glod"].map(|name| place.path().join(name));
-    let ran = run!["build", folder, "-o", out, "--json"].done();
+    let ran = run!["build", folder, "-o", out, "--as", "splats", "--json"].done();
     let below = folder.join("below");
     let left_out = "left out: folders below one are not looked into, name it too";
     assert_eq!(ran.stderr, format!("warning: {}: {left_out}\n", below.display()));
@@ -61,7 +61,7 @@ fn a_folder_is_the_models_in_it_and_they_are_one_model() {
     assert_eq!(count(&ran.json(), "triangles"), count(&single, "triangles") + 2 * 40 * 40);
     assert_eq!(count(&ran.json(), "vertices"), count(&single, "vertices") + 41 * 41);
     // The same files by name, in any order: the same sets of vertices and triangles.
-    run!["build", folder.join("b.obj"), folder.join("a.ply"), "-o", other].done();
+    run!["build", folder.join("b.obj"), folder.join("a.ply"), "-o", other, "--as", "splats"].done();
     assert!(std::fs::read(&out).unwrap() == std::fs::read(&other).unwrap(), "the same bytes");
     // The judge takes the same inputs; without one of them it sees that something is missing.
     for against in [vec![folder.clone()], vec![folder.join("a.ply"), folder.join("b.obj")]] {
@@ -211,7 +211,7 @@ fn an_interrupted_build_of_several_goes_on_with_just_these() {
     // Strips: nobody declares how many triangles they are, so it is built out of core.
     write(&folder, "a.ply", cli_support::strips(130));
     let second = write(&folder, "b.obj", obj(60, 500.0));
-    run!["build", folder, "-o", place.out].done();
+    place.build(&folder, &[]).done();
     let bytes = std::fs::read(&place.out).unwrap();
     std::fs::remove_file(&place.out).unwrap();
     // Positions and triangles take 24 bytes a vertex, kept nodes more.
@@ -221,12 +221,17 @@ fn an_interrupted_build_of_several_goes_on_with_just_these() {
     // Without one, with another, with one more.
     let refused = |inputs: &[&Path], what: &str| {
         let mut build = cli_support::command();
-        build.arg("build").args(inputs).arg("-o").arg(&place.out).args(["--resume", "--json", "--memory", "64MiB"]);
+        build
+            .arg("build")
+            .args(inputs)
+            .arg("-o")
+            .arg(&place.out)
+            .args(["--resume", "--json", "--memory", "64MiB", "--as", "splats"]);
         let said = cli_support::Ran::of(build.output().unwrap()).failed(&place.out);
         assert!(said.contains("of another input") && said.contains(what), "{said}");
     };
     refused(&[&folder.join("a.ply")], "expected 2 files, found 1 files");
-    refused(&[&folder, &other_statue().ply], "expected 2 files, found 3 files");
+    refused(&[&folder, &other_splat_statue().ply], "expected 2 files, found 3 files");
     refused(&[&second, &folder.join("a.ply")], "a.ply, found ");
     let before = std::fs::read(&second).unwrap();
     let modified = second.metadata().unwrap().modified().unwrap();
@@ -234,7 +239,7 @@ fn an_interrupted_build_of_several_goes_on_with_just_these() {
     refused(&[&folder], &format!("expected {} bytes, found {} bytes", before.len(), before.len() + 1));
     write(&folder, "b.obj", &before);
     std::fs::File::options().write(true).open(&second).unwrap().set_modified(modified).unwrap();
-    let said = run!["build", folder, "-o", place.out, "--resume", "--json", "--units", "m"].failed(&place.out);
+    let said = place.build(&folder, &["--resume", "--json", "--units", "m"]).failed(&place.out);
     assert!(said.contains("with other options"), "{said}");
     let resumed = place.resume(&folder).done().json();
     assert!(!resumed["resumed_after"].is_null(), "{resumed}");

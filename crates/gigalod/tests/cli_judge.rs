@@ -2,13 +2,13 @@
 
 mod cli_support;
 
-use cli_support::{Part, crc32, damaged, larger_statue, other_statue, statue};
+use cli_support::{Part, crc32, damaged, larger_splat_statue, other_splat_statue, splat_statue as statue};
 use std::fs::File;
 use std::path::Path;
 
 #[test]
 fn verify_finds_good_files_good_and_measures_no_violations() {
-    for model in [statue(), other_statue(), larger_statue()] {
+    for model in [statue(), other_splat_statue(), larger_splat_statue()] {
         let info = run!["info", model.glod, "--json"].done().json();
         let found = run!["verify", model.glod, "--against", model.ply, "--json"].done().json();
         assert_eq!((&found["ok"], &found["problems"]), (&true.into(), &serde_json::json!([])));
@@ -22,7 +22,7 @@ fn verify_finds_good_files_good_and_measures_no_violations() {
 
 #[test]
 fn verify_against_another_model_finds_violations() {
-    let ran = run!["verify", statue().glod, "--against", other_statue().ply, "--json"];
+    let ran = run!["verify", statue().glod, "--against", other_splat_statue().ply, "--json"];
     let found = ran.json();
     assert_eq!((ran.status, &found["ok"]), (1, &false.into()));
     assert!(found["measured"]["violations"].as_u64().unwrap() > 0 && !found["problems"][0].is_null(), "{found}");
@@ -82,9 +82,10 @@ fn a_damaged_header_or_skeleton_is_an_error_everywhere() {
 
 #[test]
 fn info_tells_what_build_told_and_adds_up() {
-    for model in [statue(), larger_statue()] {
+    for model in [statue(), larger_splat_statue()] {
         let folder = tempfile::tempdir().unwrap();
-        let built = run!["build", model.ply, "-o", folder.path().join("a.glod"), "--json"].done().json();
+        let built =
+            run!["build", model.ply, "-o", folder.path().join("a.glod"), "--as", "splats", "--json"].done().json();
         let info = run!["info", model.glod, "--json"].done().json();
         for key in ["kind", "input", "options", "nodes", "levels", "leaves", "repeated"] {
             assert_eq!(info[key], built[key], "{key}");

@@ -2,7 +2,9 @@
 
 mod cli_support;
 
-use cli_support::{Part, Ran, can_draw, command, damaged, larger_statue, names_in, read_png, statue};
+use cli_support::{
+    Part, Ran, can_draw, command, damaged, larger_splat_statue, names_in, read_png, splat_statue as statue,
+};
 use exr::prelude::{FlatSamples, read_first_flat_layer_from_file};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -179,7 +181,7 @@ fn a_raw_model_is_built_once_and_gives_the_same_picture() {
     let render = |ply: &Path, name: &str| {
         let mut command = command();
         command.env("XDG_CACHE_HOME", &cache).arg("render").arg(ply).arg("-o").arg(easel.path(name));
-        Ran::of(command.args(["--size", "160x120", "-v", "--json"]).output().unwrap()).done()
+        Ran::of(command.args(["--as", "splats", "--size", "160x120", "-v", "--json"]).output().unwrap()).done()
     };
     let first = render(&statue().ply, "a.png");
     assert!(first.stderr.contains("built as"), "{first:?}");
@@ -263,7 +265,7 @@ fn a_damaged_page_is_named_and_drawn_coarser() {
 #[test]
 fn finer_thresholds_draw_more_and_say_what_limits_them() {
     let Some(easel) = Easel::set_up() else { return };
-    let model = &larger_statue().glod;
+    let model = &larger_splat_statue().glod;
     let leaves = run!["info", model, "--json"].done().json()["leaves"].as_u64().unwrap();
     let mut before = 0;
     for error in [64.0, 32.0, 16.0, 8.0, 4.0] {
@@ -293,7 +295,7 @@ fn finer_thresholds_draw_more_and_say_what_limits_them() {
 #[test]
 fn a_coarse_picture_reads_a_part_of_the_file() {
     let Some(easel) = Easel::set_up() else { return };
-    let model = &larger_statue().glod;
+    let model = &larger_splat_statue().glod;
     let bytes = model.metadata().unwrap().len();
     let [coarse, full] =
         ["--error 16", "--full"].map(|options| easel.report(model, options)["bytes_read"].as_u64().unwrap());
@@ -304,7 +306,7 @@ fn a_coarse_picture_reads_a_part_of_the_file() {
 #[test]
 fn too_small_a_budget_is_kept_and_said() {
     let Some(easel) = Easel::set_up() else { return };
-    let model = &larger_statue().glod;
+    let model = &larger_splat_statue().glod;
     let whole = easel.report(model, "");
     let budget = whole["cpu_bytes"].as_u64().unwrap() / 3;
     let report = easel.report(model, &format!("--cpu-budget {budget}"));

@@ -3,7 +3,7 @@
 
 mod cli_support;
 
-use cli_support::builds::{PHASES, Place, TRIES, interrupted};
+use cli_support::builds::{HYBRID, Place, SPLATS, TRIES, Way, interrupted};
 use cli_support::{Ran, command, folder, names_in};
 use serde_json::Value;
 use std::fs::File;
@@ -21,24 +21,49 @@ struct Big {
     took: Duration,
 }
 
-fn big() -> &'static Big {
-    static BIG: OnceLock<Big> = OnceLock::new();
-    BIG.get_or_init(|| {
-        let (ply, out) = (folder().join("big.ply"), folder().join("big.glod"));
-        run!["synth", "statue", "--triangles", "900k", "--colors", "-o", ply].done();
-        let begun = Instant::now();
-        run!["build", ply, "-o", out, "--memory", "64MiB"].done();
-        let took = begun.elapsed();
-        let glod = std::fs::read(&out).unwrap();
-        run!["build", ply, "-o", out].done();
-        assert!(std::fs::read(&out).unwrap() == glod, "in memory as out of it");
-        Big { ply, glod, took }
+fn big(way: Way) -> &'static Big {
+    static OF_SPLATS: OnceLock<Big> = OnceLock::new();
+    static HYBRID_ONE: OnceLock<Big> = OnceLock::new();
+    if way.kind == SPLATS.kind {
+        return OF_SPLATS.get_or_init(|| {
+            let ply = folder().join("big.ply");
+            run!["synth", "statue", "--triangles", "900k", "--colors", "-o", ply].done();
+            Big::built(way, ply)
+        });
+    }
+    // What takes longer to build is out of core although it is small, and as a whole too large for the smallest memory.
+    HYBRID_ONE.get_or_init(|| {
+        let ply = folder().join("strips.ply");
+        std::fs::write(&ply, cli_support::strips(270)).unwrap();
+        Big::built(way, ply)
     })
+}
+
+impl Big {
+    fn built(way: Way, ply: PathBuf) -> Self {
+        let place = Place::of(way);
+        let begun = Instant::now();
+        place.build(&ply, &["--memory", "64MiB"]).done();
+        let took = begun.elapsed();
+        let glod = std::fs::read(&place.out).unwrap();
+        place.build(&ply, &[]).done();
+        assert!(std::fs::read(&place.out).unwrap() == glod, "in memory as out of it");
+        Self { ply, glod, took }
+    }
 }
 
 #[test]
 fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
-    let (big, place) = (big(), Place::new());
+    expect_the_same_bytes_after_kills(SPLATS);
+}
+
+#[test]
+fn a_hybrid_build_killed_again_and_again_ends_with_the_same_bytes() {
+    expect_the_same_bytes_after_kills(HYBRID);
+}
+
+fn expect_the_same_bytes_after_kills(way: Way) {
+    let (big, place) = (big(way), Place::of(way));
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     let mut random = || {
         state ^= state << 13;
@@ -50,8 +75,8 @@ fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
     while kills < 10 {
         let mut child = place.spawn(&big.ply, &["--resume"]);
         // From the first phase to the last, at any moment of it.
-        let phases = kills * (PHASES.len() + 1) / 10;
-        let last = place.kill_after(&mut child, phases, big.took.mul_f64(random() / PHASES.len() as f64));
+        let phases = kills * (way.phases.len() + 1) / 10;
+        let last = place.kill_after(&mut child, phases, big.took.mul_f64(random() / way.phases.len() as f64));
         if child.wait().unwrap().success() {
             // It was done before its time: once more from the beginning.
             place.expect_done(&big.glod);
@@ -76,10 +101,19 @@ fn a_build_killed_again_and_again_ends_with_the_same_bytes() {
 
 #[test]
 fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now() {
-    let big = big();
+    expect_finished_phases_to_stay(SPLATS);
+}
+
+#[test]
+fn finished_phases_of_a_hybrid_build_are_not_done_again() {
+    expect_finished_phases_to_stay(HYBRID);
+}
+
+fn expect_finished_phases_to_stay(way: Way) {
+    let big = big(way);
     let others = [["--memory", "64MiB"], ["--memory", "4GiB"], ["--memory", "256MiB"], ["--threads", "1"]];
-    for (phases, options) in (1..=PHASES.len()).zip(others) {
-        let place = Place::new();
+    for (phases, options) in (1..=way.phases.len()).zip(others) {
+        let place = Place::of(way);
         // Where the machine is so busy that the build was over before it could be killed: once more.
         let phase = std::iter::repeat_with(|| {
             let mut child = place.spawn(&big.ply, &["--threads", "2"]);
@@ -87,7 +121,7 @@ fn finished_phases_are_not_done_again_whatever_memory_and_threads_there_are_now(
         });
         let phase = phase.take(TRIES).flatten().next().expect("large enough to be killed in time");
         println!("goes on after {phase}");
-        let ran = run!["build", big.ply, "-o", place.out, "--resume", "--json", options[0], options[1]].done();
+        let ran = place.build(&big.ply, &["--resume", "--json", options[0], options[1]]).done();
         assert_eq!(ran.stderr, "", "nothing to note");
         assert_eq!(ran.json()["resumed_after"], *phase);
         let names: Vec<_> =
@@ -109,8 +143,12 @@ fn another_input_and_other_options_are_refused_and_nothing_is_lost() {
         assert_eq!(place.journaled().as_deref(), Some("leaves"));
         said
     };
-    let said = refused(run!["build", ply, "-o", place.out, "--resume", "--json", "--up", "z"], "with other options");
+    let said = refused(place.build(&ply, &["--resume", "--json", "--up", "z"]), "with other options");
     assert!(said.contains("expected --as splats --up y, found --as splats --up z;"), "{said}");
+
+    let resume = ["build", ply.to_str().unwrap(), "-o", place.out.to_str().unwrap(), "--resume", "--json"];
+    let hybrid = cli_support::gigalod(resume.iter().chain(&["--as", "hybrid"]));
+    assert!(refused(hybrid, "with other options").contains("found --appearance on --as hybrid --res 64"));
 
     let other = place.folder.path().join("other.ply");
     std::fs::copy(&ply, &other).unwrap();
@@ -186,13 +224,23 @@ fn a_damaged_journal_begins_anew_and_says_so() {
     assert!(std::fs::read(&place.out).unwrap() == bytes);
 }
 
+/// Where nobody declares faces, it is known from what was begun whether they are points.
+#[test]
+fn what_was_begun_as_splats_is_continued_where_nobody_says_as_what() {
+    let (place, ply, bytes) = interrupted();
+    let ran = run!["build", ply, "-o", place.out, "--memory", "64MiB", "--resume", "--json"].done();
+    assert_eq!((&ran.json()["resumed_after"], &ran.json()["kind"]), (&"leaves".into(), &"splats".into()));
+    assert_eq!(ran.stderr, "");
+    assert!(std::fs::read(&place.out).unwrap() == bytes);
+}
+
 #[test]
 fn without_resume_an_old_folder_is_removed() {
     // Out of memory, and in it.
     for memory in ["64MiB", "2GiB"] {
         let (place, ply, bytes) = interrupted();
         let small = if memory == "2GiB" { cli_support::statue().ply.clone() } else { ply };
-        let ran = run!["build", small, "-o", place.out, "--memory", memory, "--json"].done();
+        let ran = place.build(&small, &["--memory", memory, "--json"]).done();
         assert!(ran.json()["resumed_after"].is_null() && ran.stderr.is_empty(), "{ran:?}");
         assert_eq!(names_in(place.folder.path()), ["a.glod", "strips.ply"]);
         assert!(memory == "2GiB" || std::fs::read(&place.out).unwrap() == bytes);
@@ -204,9 +252,8 @@ fn only_one_process_builds_an_output_at_a_time() {
     let (place, ply, bytes) = interrupted();
     let lock = File::options().write(true).open(place.work.join("lock")).unwrap();
     lock.lock().unwrap();
-    for resume in [&["--resume"][..], &[]] {
-        let arguments = ["build", ply.to_str().unwrap(), "-o", place.out.to_str().unwrap(), "--json"];
-        let ran = cli_support::gigalod(arguments.iter().chain(resume));
+    for options in [&["--json", "--resume"][..], &["--json"]] {
+        let ran = place.build(&ply, options);
         let expected = format!("another build is working in {}", place.work.display());
         assert_eq!((ran.failed(&place.out), ran.stderr.lines().count()), (expected, 1));
         assert_eq!(place.journaled().as_deref(), Some("leaves"), "unharmed");
@@ -219,11 +266,11 @@ fn only_one_process_builds_an_output_at_a_time() {
 /// What Ctrl-C does, and `kill`.
 #[test]
 fn an_interrupted_build_says_that_it_can_go_on_if_it_can() {
-    let big = big();
+    let big = big(SPLATS);
     for phases in [0, 1, 2] {
         let place = Place::new();
         let mut build = command();
-        build.arg("build").arg(&big.ply).arg("-o").arg(&place.out).args(["--memory", "64MiB"]);
+        build.arg("build").arg(&big.ply).arg("-o").arg(&place.out).args(["--memory", "64MiB", "--as", "splats"]);
         let child = build.stderr(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         while !place.work.join("pages.part").exists() || phases > 0 && place.journaled().is_none() {
             std::thread::yield_now();

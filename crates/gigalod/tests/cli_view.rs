@@ -5,7 +5,7 @@
 
 mod cli_support;
 
-use cli_support::{Ran, command, folder, shape, statue};
+use cli_support::{Ran, command, folder, shape, splat_statue as statue};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
@@ -240,7 +240,7 @@ fn a_rested_picture_is_that_of_render_on_the_screen_and_in_a_file() {
 fn a_raw_model_is_built_and_its_measured_points_are_its_own() {
     let Some(screen) = Screen::open() else { return };
     let place = tempfile::tempdir_in(folder()).unwrap();
-    let viewing = screen.view(place.path(), [&statue().ply]);
+    let viewing = screen.view(place.path(), ["--as".as_ref(), "splats".as_ref(), statue().ply.as_os_str()]);
     let _ = viewing.takes_picture_when_built();
     viewing.presses("m");
     // Left of the panel.

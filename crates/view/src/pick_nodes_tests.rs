@@ -1,5 +1,5 @@
 use super::*;
-use gigalod_format::hybrid::{Root, Skeleton};
+use gigalod_format::hybrid::{Model, Prepared, Root, Skeleton, Statistics};
 use gigalod_format::{Bounds, Container, InputCounts, Kind, MemoryStore, Metadata, Writer};
 use gigalod_geom::Aabb;
 use gigalod_geom::camera::UpAxis;
@@ -9,6 +9,7 @@ use std::sync::Arc;
 const BITS: u32 = 10;
 const ORIGIN: DVec3 = DVec3::new(3.0, -1.0, 8.0);
 const ERROR: f32 = 1e-4;
+const NORMAL_BITS: u32 = 8;
 
 /// A root, and a leaf for each of its eighths with triangles all over it: the same for the same.
 fn pages() -> (Vec<NodeRecord>, Vec<Page>) {
@@ -27,8 +28,8 @@ fn pages() -> (Vec<NodeRecord>, Vec<Page>) {
         triangles: page.triangles.len() as u32,
         points: 0,
         borders: 0,
-        bytes: page.encode().len() as u32,
-        checksum: gigalod_format::checksum(&page.encode()),
+        bytes: 0,
+        checksum: 0,
     };
     let mut state = 12345u32;
     let mut random = || {
@@ -57,14 +58,14 @@ fn pages() -> (Vec<NodeRecord>, Vec<Page>) {
 }
 
 fn bytes() -> Vec<u8> {
-    let (records, pages) = pages();
+    let (mut records, pages) = pages();
     let bounds = Aabb { min: ORIGIN, max: ORIGIN + 1.0 };
     let root = Root {
         origin: ORIGIN,
         edge: 1.0,
         bounds,
         cell_bits: BITS,
-        normal_bits: 8,
+        normal_bits: NORMAL_BITS,
         resolution: 64,
         nodes: 9,
         leaves: 8,
@@ -74,7 +75,18 @@ fn bytes() -> Vec<u8> {
         closed: false,
         up: UpAxis::Y,
     };
-    let skeleton = Skeleton::encode(&root, &records);
+    let mut statistics = Statistics::default();
+    let prepare = |page: &Page| Prepared::new(page, page.positions.len() as u32, NORMAL_BITS);
+    let prepared: Vec<Prepared> = pages.iter().map(prepare).collect();
+    prepared.iter().for_each(|prepared| statistics.count(prepared));
+    let model = Model::of(&statistics);
+    let coded: Vec<Vec<u8>> = prepared.iter().map(|prepared| prepared.encode(&model)).collect();
+    for ((record, prepared), bytes) in records.iter_mut().zip(&prepared).zip(&coded) {
+        record.borders = prepared.page().borders.len() as u32;
+        record.bytes = bytes.len() as u32;
+        record.checksum = gigalod_format::checksum(bytes);
+    }
+    let skeleton = Skeleton::encode(&root, &records, &model);
     let metadata = Metadata {
         generator: "test".into(),
         input: InputCounts::default(),
@@ -93,7 +105,7 @@ fn bytes() -> Vec<u8> {
     };
     let mut out = std::io::Cursor::new(Vec::new());
     let mut writer = Writer::new(&mut out, Kind::Hybrid, skeleton.len() as u64).unwrap();
-    pages.iter().for_each(|page| writer.page(&page.encode()).unwrap());
+    coded.iter().for_each(|page| writer.page(page).unwrap());
     writer.finish(&skeleton, &metadata).unwrap();
     out.into_inner()
 }

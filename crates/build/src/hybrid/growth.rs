@@ -9,11 +9,12 @@ use super::nodes::Nodes;
 use super::octree::{self, Piece, Raised};
 use super::patch::{Face, Patch, Spot, Vertex};
 use super::pieces::Facts;
-use crate::BuildError;
 use crate::progress::Phases;
 use crate::splats::plan::MemoryPlan;
 use crate::spool::{Place, Spool};
 use crate::work::Work;
+use crate::{BuildError, Options};
+use gigalod_import::ModelStream;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::io;
@@ -41,8 +42,23 @@ pub(super) struct Growth {
 const SAVE_EVERY: u64 = 4;
 /// Bytes of work for each piece of a set in memory: the piece twice, its page, patches, and a share of what is being simplified.
 const WORK_PER_PIECE: u64 = 260;
+/// Bytes of the spools for each vertex: position, normal, colour, what it gathers.
+const SPOOLED_PER_VERTEX: u64 = 24 + 12 + 3 + 16;
+/// And for each triangle, where it is a piece already.
+const SPOOLED_PER_TRIANGLE: u64 = 12 + 60;
+/// Bytes of everything for each triangle, where the octree is made in memory: 150 to 170 on statues, most of it twice the pieces.
+const ALL_PER_TRIANGLE: u64 = 200;
 /// Within this step.
 pub(super) const GROWING: &str = "part of octree";
+
+/// Decides by what the stream declares; a stream that declares nothing is spooled to files.
+pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bool {
+    let (Some(vertices), Some(faces)) = (input.declared_vertices(), input.declared_faces()) else { return false };
+    let of_vertices = vertices.saturating_mul(SPOOLED_PER_VERTEX);
+    let mesh = of_vertices.saturating_add(faces.saturating_mul(SPOOLED_PER_TRIANGLE));
+    let octree = faces.saturating_mul(ALL_PER_TRIANGLE);
+    mesh.max(octree) <= options.memory_bytes - options.memory_bytes / 8
+}
 
 impl Growth {
     pub(super) fn new(pieces: Spool<Piece>, plan: &MemoryPlan<'_>) -> io::Result<Self> {

@@ -119,7 +119,7 @@ pub fn build(
         ("tmax".to_string(), most_triangles.to_string()),
         ("appearance".to_string(), if options.keeps_looks { "on" } else { "off" }.to_string()),
     ]);
-    let in_memory = plan::fits_into_memory(options, &*input);
+    let in_memory = growth::fits_into_memory(options, &*input);
     let site = Site::open(&*input, options, (Kind::Hybrid, own), (plan::threads(options), in_memory), progress, out)?;
     let plan = MemoryPlan::new(options, site.place(), folder_of(&site.out));
 
@@ -129,9 +129,15 @@ pub fn build(
         stage = match stage {
             Stage::Start => {
                 let mut input = input.take().expect("a build starts once");
-                Stage::Read(mesh::read(&mut *input, &plan, &phases)?)
+                let mesh = mesh::read(&mut *input, &plan, &phases)?;
+                if mesh.triangles.len() == 0 {
+                    return Err(BuildError::NoTriangles);
+                }
+                if options.only_suited && mesh.paint.is_some() {
+                    return Err(BuildError::Painted);
+                }
+                Stage::Read(mesh)
             }
-            Stage::Read(mesh) if mesh.triangles.len() == 0 => return Err(BuildError::NoTriangles),
             Stage::Read(mesh) => {
                 if mesh.paint.is_some() {
                     progress.note("textures are left out; --as splats keeps them");

@@ -53,7 +53,8 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
     let report = build(&inputs, &args.output, &args.options, sense, recovery, console)?;
     let (seconds, cpu_seconds) = usage.seconds();
     let metadata = &report.metadata;
-    if metadata.leaves < FEW_VERTICES {
+    let kind = metadata.options.get("as").map_or("splats", String::as_str);
+    if kind == Kind::Splats.name() && metadata.leaves < FEW_VERTICES {
         let what = if metadata.input.points > 0 {
             format!("only {} points; splats are made for dense scans", metadata.leaves)
         } else {
@@ -62,7 +63,7 @@ pub(crate) fn run(args: &BuildArgs, console: &Console) -> Result<Outcome, CliErr
         console.warn(&CliError::in_file(inputs.name(), what));
     }
     let json = BuildReport {
-        kind: metadata.options.get("as").map_or("splats", String::as_str),
+        kind,
         input: metadata.input,
         options: &metadata.options,
         nodes: metadata.nodes,
@@ -135,9 +136,11 @@ pub(crate) fn build(
     let representation = match options.representation {
         Representation::Splats => Kind::Splats,
         Representation::Hybrid => Kind::Hybrid,
-        Representation::Auto if suits_hybrid(&*stream) => Kind::Hybrid,
+        Representation::Auto if suits_hybrid(&*stream, options) => Kind::Hybrid,
         Representation::Auto => Kind::Splats,
     };
+    let is_auto = options.representation == Representation::Auto;
+    let is_known = stream.declared_faces().is_some();
     let options = Options {
         memory_bytes: options.memory,
         threads: options.threads,
@@ -147,16 +150,33 @@ pub(crate) fn build(
         resolution: options.res,
         most_triangles: options.tmax,
         keeps_looks: options.appearance == Appearance::On,
+        only_suited: is_auto,
         input: (recovery != Recovery::Lost).then_some(identity),
         side: side.clone(),
         resume: recovery == Recovery::Resume,
     };
     let work = console.work(&inputs.name().file_name().unwrap_or_default().to_string_lossy());
-    let builder = match representation {
-        Kind::Hybrid => gigalod_build::hybrid::build,
-        _ => gigalod_build::splats::build,
+    let built = match representation {
+        Kind::Hybrid => gigalod_build::hybrid::build(stream, &options, &work, output),
+        _ => gigalod_build::splats::build(stream, &options, &work, output),
     };
-    let built = builder(stream, &options, &work, output).map_err(|error| {
+    let as_splats = |resume| {
+        let (stream, _) = inputs.open(sense, &side, console)?;
+        Ok(gigalod_build::splats::build(stream, &Options { resume, ..options.clone() }, &work, output))
+    };
+    let built = match built {
+        // Some formats say only in the middle what they hold.
+        Err(BuildError::NoTriangles | BuildError::Painted) if is_auto => as_splats(false)?,
+        // So what was begun may be splats.
+        Err(begun @ BuildError::OtherBuild { .. }) if is_auto && representation == Kind::Hybrid && !is_known => {
+            match as_splats(true)? {
+                Err(BuildError::OtherBuild { .. }) => Err(begun),
+                other => other,
+            }
+        }
+        other => other,
+    };
+    let built = built.map_err(|error| {
         let is_ours = !matches!(error, BuildError::Busy { .. } | BuildError::OtherBuild { .. });
         let error = CliError::build(inputs.name(), output, &error);
         let stays = is_ours && recovery != Recovery::Lost && gigalod_build::can_continue(output);
@@ -167,9 +187,9 @@ pub(crate) fn build(
     Ok(built)
 }
 
-/// A mesh whose colours, if any, are its vertices'. What materials say of triangles, splats sample.
-fn suits_hybrid(stream: &dyn ModelStream) -> bool {
-    stream.declared_faces() != Some(0) && stream.materials().is_empty()
+/// A mesh whose colours, if any, are its vertices'. What materials say of triangles, splats sample, as finely as `--spacing` says.
+fn suits_hybrid(stream: &dyn ModelStream, options: &BuildOptions) -> bool {
+    stream.declared_faces() != Some(0) && stream.materials().is_empty() && options.spacing.is_none()
 }
 
 /// Pictures that are missing were told of when they were asked for; a missing library of materials changes only looks, too.

@@ -1,14 +1,20 @@
 //! Builds that are interrupted, for tests of what becomes of them.
 
 use super::{Ran, command, names_in, strips};
-use crate::run;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Phases that can be gone on after, as journals name them, in order.
-pub(crate) const PHASES: [&str; 4] = ["read", "leaves", "part of tree", "tree"];
+/// What a build makes, and the phases that can be gone on after, as journals name them, in order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    pub(crate) kind: &'static str,
+    pub(crate) phases: &'static [&'static str],
+}
+
+pub(crate) const SPLATS: Way = Way { kind: "splats", phases: &["read", "leaves", "part of tree", "tree"] };
+pub(crate) const HYBRID: Way = Way { kind: "hybrid", phases: &["read", "pieces", "part of octree"] };
 
 /// So often a build is begun anew that was over before it could be killed: then the machine is too fast for that.
 pub(crate) const TRIES: usize = 100;
@@ -18,23 +24,36 @@ pub(crate) struct Place {
     pub(crate) folder: tempfile::TempDir,
     pub(crate) out: PathBuf,
     pub(crate) work: PathBuf,
+    pub(crate) way: Way,
 }
 
 impl Place {
+    /// For splats.
     pub(crate) fn new() -> Self {
+        Self::of(SPLATS)
+    }
+
+    pub(crate) fn of(way: Way) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let (out, work) = (folder.path().join("a.glod"), folder.path().join(".a.glod.build"));
-        Self { folder, out, work }
+        Self { folder, out, work, way }
     }
 
     pub(crate) fn spawn(&self, input: &Path, options: &[&str]) -> Child {
         let mut command = command();
-        command.arg("build").arg(input).arg("-o").arg(&self.out).args(["--memory", "64MiB"]).args(options);
+        command.arg("build").arg(input).arg("-o").arg(&self.out).args(["--memory", "64MiB", "--as", self.way.kind]);
+        command.args(options);
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
     pub(crate) fn resume(&self, input: &Path) -> Ran {
-        run!["build", input, "-o", self.out, "--memory", "64MiB", "--resume", "--json"]
+        self.build(input, &["--memory", "64MiB", "--resume", "--json"])
+    }
+
+    pub(crate) fn build(&self, input: &Path, options: &[&str]) -> Ran {
+        let mut command = command();
+        command.arg("build").arg(input).arg("-o").arg(&self.out).args(["--as", self.way.kind]).args(options);
+        Ran::of(command.output().unwrap())
     }
 
     /// The phase that the journal says is finished.
@@ -59,7 +78,7 @@ impl Place {
     /// that was the last to be finished.
     pub(crate) fn kill_after(&self, child: &mut Child, phases: usize, more: Duration) -> Option<String> {
         let has_come = |phase: &String| {
-            let number = PHASES.iter().position(|name| name == phase);
+            let number = self.way.phases.iter().position(|name| name == phase);
             number.expect("journals name the phases that tests know") + 1 >= phases
         };
         let is_early = || phases > 0 && !self.journaled().as_ref().is_some_and(has_come);
@@ -74,8 +93,11 @@ impl Place {
 
     /// Continues or begins a build that fails for want of room as soon as a file has more than so many bytes.
     pub(crate) fn build_within(&self, file_bytes: u64, input: &Path) -> Ran {
-        let script =
-            format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" build --resume --json -o \"$@\"", file_bytes / 512);
+        let script = format!(
+            "trap '' XFSZ; ulimit -f {}; exec \"$0\" build --resume --json --as {} -o \"$@\"",
+            file_bytes / 512,
+            self.way.kind
+        );
         let mut shell = Command::new("sh");
         shell.arg("-c").arg(script).arg(env!("CARGO_BIN_EXE_gigalod")).arg(&self.out).arg(input).stdin(Stdio::null());
         let mut ran = Ran::of(shell.output().unwrap());
@@ -96,19 +118,19 @@ pub(crate) const SMALL_VERTICES: u64 = SIDE * SIDE;
 const SIDE: u64 = 130;
 
 /// A small model that is built out of core, where it is to be built, and what it builds into.
-pub(crate) fn small() -> (Place, PathBuf, Vec<u8>) {
-    let place = Place::new();
+pub(crate) fn small(way: Way) -> (Place, PathBuf, Vec<u8>) {
+    let place = Place::of(way);
     let ply = place.folder.path().join("strips.ply");
     std::fs::write(&ply, strips(SIDE as usize)).unwrap();
-    run!["build", ply, "-o", place.out].done();
+    place.build(&ply, &[]).done();
     let bytes = std::fs::read(&place.out).unwrap();
     std::fs::remove_file(&place.out).unwrap();
     (place, ply, bytes)
 }
 
-/// The same, with a build that was interrupted after the leaves.
+/// The same, with a build of splats that was interrupted after the leaves.
 pub(crate) fn interrupted() -> (Place, PathBuf, Vec<u8>) {
-    let (place, ply, bytes) = small();
+    let (place, ply, bytes) = small(SPLATS);
     // Positions and triangles take 24 bytes a vertex, kept nodes more.
     let ran = place.build_within(SMALL_VERTICES * 25, &ply);
     assert!(ran.failed(&place.out).contains("temporary files"), "{ran:?}");

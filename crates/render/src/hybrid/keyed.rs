@@ -18,7 +18,7 @@ use crate::{Gpu, RenderError};
 use gigalod_geom::Camera;
 
 /// What is at most so many pixels wide and high is drawn by single invocations, unless
-/// [`crate::Renderer::set_compute_extent`] says otherwise. Measured on the software adapter (`examples/hybrid_speed.rs`): beginning a
+/// [`crate::Renderer::set_compute_extent`] says otherwise. Measured on the software adapter (`examples/hybrid_drawing.rs`): beginning a
 /// workgroup for a triangle takes it as long as an invocation takes for thousands of pixels.
 pub(crate) fn compute_extent_px(gpu: &Gpu) -> u32 {
     if gpu.is_software() { MOST_COMPUTE_EXTENT_PX } else { 16 }

@@ -188,7 +188,7 @@ impl Model {
             closed: false,
             up: UpAxis::Y,
         };
-        let skeleton = Skeleton::encode(&root, &records);
+        let skeleton = Skeleton::encode(&root, &records, &gigalod_format::hybrid::Model::default());
         let writer = Writer::new(Cursor::new(Vec::new()), Kind::Hybrid, skeleton.len() as u64).unwrap();
         let (bytes, _) = writer.finish(&skeleton, &metadata()).unwrap();
         let container = Container::open(Arc::new(MemoryStore::new(bytes.into_inner()))).unwrap();

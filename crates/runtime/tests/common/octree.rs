@@ -1,6 +1,6 @@
 //! Hybrid files made up in memory: a sphere's surface in an octree, uneven, with errors, cones and pages that fit.
 
-use gigalod_format::hybrid::{HybridFile, NodeId, NodeRecord, Page, Root, Skeleton};
+use gigalod_format::hybrid::{HybridFile, Model, NodeId, NodeRecord, Page, Prepared, Root, Skeleton, Statistics};
 use gigalod_format::{Bounds, Container, InputCounts, Kind, LevelSummary, MemoryStore, Metadata, Writer};
 use gigalod_geom::Aabb;
 use gigalod_geom::camera::UpAxis;
@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 pub(crate) const CELL_BITS: u32 = 8;
 pub(crate) const RADIUS: f64 = 0.45;
+const NORMAL_BITS: u32 = 8;
 
 /// A file, as it is put together.
 #[derive(Clone)]
@@ -17,6 +18,7 @@ pub(crate) struct Octree {
     pub(crate) root: Root,
     pub(crate) records: Vec<NodeRecord>,
     pub(crate) pages: Vec<Page>,
+    model: Model,
 }
 
 /// The same for the same.
@@ -53,7 +55,7 @@ impl Octree {
             edge: 1.0,
             bounds: Aabb { min: DVec3::new(10.05, -19.95, 5.05), max: DVec3::new(10.95, -19.05, 5.95) },
             cell_bits: CELL_BITS,
-            normal_bits: 8,
+            normal_bits: NORMAL_BITS,
             resolution: 64,
             nodes: records.len() as u64,
             leaves,
@@ -63,18 +65,26 @@ impl Octree {
             closed,
             up: UpAxis::Y,
         };
-        Self { root, records, pages }
+        // In the order in which they are coded, and with the borders that this finds.
+        let mut statistics = Statistics::default();
+        for (record, page) in records.iter_mut().zip(&mut pages) {
+            let prepared = Prepared::new(page, record.vertices, NORMAL_BITS);
+            statistics.count(&prepared);
+            *page = prepared.into_page();
+            record.borders = page.borders.len() as u32;
+        }
+        Self { root, records, pages, model: Model::of(&statistics) }
     }
 
     /// The file's bytes.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         let mut records = self.records.clone();
-        let pages: Vec<Vec<u8>> = self.pages.iter().map(Page::encode).collect();
+        let pages: Vec<Vec<u8>> = (0..self.pages.len()).map(|number| self.encoded(number)).collect();
         for (record, page) in records.iter_mut().zip(&pages) {
             record.bytes = page.len() as u32;
             record.checksum = gigalod_format::checksum(page);
         }
-        let skeleton = Skeleton::encode(&self.root, &records);
+        let skeleton = Skeleton::encode(&self.root, &records, &self.model);
         let metadata = Metadata {
             generator: "test".into(),
             input: InputCounts { triangles: 1000, vertices: 500, points: 0 },
@@ -98,15 +108,19 @@ impl Octree {
         out.into_inner()
     }
 
+    fn encoded(&self, number: usize) -> Vec<u8> {
+        self.pages[number].encode(self.records[number].vertices, NORMAL_BITS, &self.model).0
+    }
+
     fn summary(&self, level: u32) -> LevelSummary {
-        let of_level = || self.records.iter().zip(&self.pages).filter(|(record, _)| record.level == level);
+        let of_level = || self.records.iter().enumerate().filter(|(_, record)| record.level == level);
         LevelSummary {
             level,
             nodes: of_level().count() as u64,
-            triangles: of_level().map(|(record, _)| u64::from(record.triangles)).sum(),
-            points: of_level().map(|(record, _)| u64::from(record.points)).sum(),
-            bytes: of_level().map(|(_, page)| page.encode().len() as u64).sum(),
-            max_error: of_level().map(|(record, _)| f64::from(record.error_geo)).fold(0.0, f64::max),
+            triangles: of_level().map(|(_, record)| u64::from(record.triangles)).sum(),
+            points: of_level().map(|(_, record)| u64::from(record.points)).sum(),
+            bytes: of_level().map(|(number, _)| self.encoded(number).len() as u64).sum(),
+            max_error: of_level().map(|(_, record)| f64::from(record.error_geo)).fold(0.0, f64::max),
         }
     }
 
@@ -140,7 +154,9 @@ fn node(cell: IVec3, level: u32, first_child: u32, children: u32) -> (NodeRecord
     let min_steps = (cell * (1 << CELL_BITS) - from).to_array();
     let extent_steps = (from + to + (1 << CELL_BITS)).to_array().map(|at| at as u16);
     let error = edge / 64.0;
-    let (vertices, triangles, borders) = (30 + random % 20, 40 + random % 50, random >> 4 & 7);
+    // Around a loop, once to twice: what is there twice has no borders.
+    let vertices = 30 + random % 20;
+    let triangles = vertices + (random >> 4 & 7) * vertices / 7;
     let points = if children > 0 { random >> 8 & 31 } else { 0 };
     let record = NodeRecord {
         level,
@@ -157,7 +173,7 @@ fn node(cell: IVec3, level: u32, first_child: u32, children: u32) -> (NodeRecord
         vertices,
         triangles,
         points,
-        borders,
+        borders: 0,
         bytes: 0,
         checksum: 0,
     };
@@ -167,7 +183,7 @@ fn node(cell: IVec3, level: u32, first_child: u32, children: u32) -> (NodeRecord
         normals: vec![0; count],
         colors: vec![[200, 100, 50, 255]; count],
         triangles: (0..triangles).map(|at| [at % vertices, (at + 1) % vertices, (at + 2) % vertices]).collect(),
-        borders: (0..borders).map(|at| [at, at + 1]).collect(),
+        borders: Vec::new(),
     };
     (record, page)
 }

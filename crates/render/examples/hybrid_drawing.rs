@@ -1,7 +1,7 @@
 //! How fast triangles are drawn: layers of grids that fill the picture, with triangles of some sizes. Prints, for each size and each
 //! largest extent that a single invocation draws, processor time a frame and triangles a processor-second.
 //!
-//! `cargo run --release -p gigalod-render --example hybrid_speed [EXTENT…]`
+//! `cargo run --release -p gigalod-render --example hybrid_drawing [EXTENT…]`
 
 #[path = "../tests/models/mod.rs"]
 mod models;
