@@ -52,7 +52,11 @@ pub(crate) enum Found {
 }
 
 /// Looks a file up that would be built with these options; `at` is told how many bytes of how many were read, and says whether to go on.
-pub(crate) fn find(file: &Path, options: &BuildOptions, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<Found, CliError> {
+pub(crate) fn find(
+    file: &Path,
+    options: &BuildOptions,
+    at: &mut dyn FnMut(u64, u64) -> bool,
+) -> Result<Found, CliError> {
     if files::is_container(file)? {
         return Ok(Found::Itself);
     }
