@@ -16,4 +16,5 @@ pub use gigalod_render as render;
 pub use gigalod_runtime as runtime;
 pub use gigalod_synth as synth;
 
+pub mod export;
 pub mod verify;

@@ -9,6 +9,7 @@ mod demo;
 mod error;
 #[cfg(feature = "view")]
 mod exact;
+mod export;
 mod files;
 mod info;
 mod inputs;
@@ -22,6 +23,7 @@ mod subject;
 mod synth;
 mod usage;
 mod verify;
+mod verify_hybrid;
 #[cfg(feature = "view")]
 mod view;
 #[cfg(feature = "view")]
@@ -67,6 +69,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Bench(args) => bench::run(args, &console),
         Command::Info(args) => info::run(args, &console),
         Command::Verify(args) => verify::run(args, &console),
+        Command::Export(args) => export::run(args, &console),
         Command::Compare(args) => compare::run(args, &console),
         Command::Synth(args) => synth::run(args, &console),
         Command::Demo(args) => demo::run(args, &console),

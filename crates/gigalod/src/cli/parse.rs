@@ -104,6 +104,13 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
+        _ => Err(format!("'{text}', expected a number of at least 0")),
+    }
+}
+
 /// Length of a camera path.
 pub(crate) fn seconds(text: &str) -> Result<f64, String> {
     match positive(text)? {

@@ -1,15 +1,16 @@
-//! `gigalod verify`.
+//! `gigalod verify`. Splats are judged here, hybrid files in `verify_hybrid`.
 
 use super::args::VerifyArgs;
 use super::error::{CliError, Outcome};
 use super::files;
 use super::info::shown;
 use super::inputs::{Inputs, Sense};
-use super::progress::Console;
+use super::progress::{Console, Work};
+use super::verify_hybrid;
 use gigalod::verify::{self, Measured, Problems, Sampled, SplatTree};
 use gigalod_build::{Progress, SideLog};
 use gigalod_format::splats::SplatFile;
-use gigalod_format::{InputCounts, Kind, Metadata};
+use gigalod_format::{Container, InputCounts, Kind, Metadata};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, LengthUnit};
 use gigalod_import::{Batch, Material, read_all};
@@ -38,47 +39,63 @@ struct MeasuredReport {
 
 pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliError> {
     let container = files::open_container(&args.file)?;
-    if container.kind() != Kind::Splats {
-        let kind = container.kind().name();
-        return Err(CliError::in_file(&args.file, format!("a {kind} file, verify checks splat files only as yet")));
-    }
-    let splats = SplatFile::open(container).map_err(|error| CliError::format(&args.file, &error))?;
-    // The metadata is not needed for drawing, but it has a checksum too.
-    let metadata = splats.container().read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
+    // It is not needed for drawing, but it has a checksum too.
+    let metadata = container.read_metadata().map_err(|error| CliError::format(&args.file, &error))?;
     let name = args.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let work = console.work(&name);
+    match container.kind() {
+        Kind::Splats => splats(args, container, &metadata, &work, console),
+        Kind::Hybrid => verify_hybrid::run(args, container, &metadata, &work, console),
+        kind => Err(CliError::in_file(&args.file, format!("a {} file, which verify does not know", kind.name()))),
+    }
+}
+
+/// Each of the problems as a warning.
+pub(super) fn tell(args: &VerifyArgs, problems: &[String], console: &Console) {
+    for problem in problems {
+        console.warn(&CliError::in_file(&args.file, problem));
+    }
+}
+
+/// What there is to say of so many problems.
+pub(super) fn verdict(problems: &Problems) -> String {
+    match problems.count {
+        0 => "sound".to_string(),
+        1 => "1 problem".to_string(),
+        count => format!("{count} problems"),
+    }
+}
+
+fn splats(
+    args: &VerifyArgs,
+    container: Container,
+    metadata: &Metadata,
+    work: &Work<'_>,
+    console: &Console,
+) -> Result<Outcome, CliError> {
+    let splats = SplatFile::open(container).map_err(|error| CliError::format(&args.file, &error))?;
     work.begin("check", splats.skeleton().pages().len() as u64);
     let (tree, mut problems) = verify::check(&splats, &mut |pages| work.at(pages));
-    let tell = |problems: &[String]| {
-        for problem in problems {
-            console.warn(&CliError::in_file(&args.file, problem));
-        }
-    };
     let (mut measured, mut told) = (None, 0);
     if !args.against.is_empty() && problems.count == 0 {
         let originals = Inputs::find(&args.against, console)?;
         let root = splats.skeleton().root();
-        let (model, materials) = read_model(&originals, root.up, &work, console)?;
-        expect_same(&model, &metadata, &root.bounds, &mut problems);
+        let (model, materials) = read_model(&originals, root.up, work, console)?;
+        expect_same(&model, metadata, &root.bounds, &mut problems);
         // Before what takes long.
-        tell(&problems.told);
+        tell(args, &problems.told, console);
         told = problems.told.len();
         let splats = (&tree, root.origin);
-        measured = Some(measure(model, &materials, splats, &metadata, originals.name(), &work, &mut problems)?);
+        measured = Some(measure(model, &materials, splats, metadata, originals.name(), work, &mut problems)?);
     }
     work.finish();
 
-    tell(&problems.told[told..]);
+    tell(args, &problems.told[told..], console);
     let ok = problems.count == 0;
     let mut text = String::new();
-    let verdict = match problems.count {
-        0 => "sound".to_string(),
-        1 => "1 problem".to_string(),
-        count => format!("{count} problems"),
-    };
-    let _ = writeln!(text, "{}: {verdict}, {} nodes checked", args.file.display(), tree.nodes.len());
+    let _ = writeln!(text, "{}: {}, {} nodes checked", args.file.display(), verdict(&problems), tree.nodes.len());
     if let Some(Measured { hausdorff, rms, worst_ratio, violations }) = measured {
-        let unit = metadata.options.get("units").map_or("model units".into(), |unit| shown(unit));
+        let unit = unit_of(metadata);
         let _ = writeln!(
             text,
             "leaves against the original: largest distance {hausdorff:.4e}, rms {rms:.4e} ({unit})\n\
@@ -97,6 +114,11 @@ pub(crate) fn run(args: &VerifyArgs, console: &Console) -> Result<Outcome, CliEr
         }),
     };
     Ok(Outcome { good: ok, ..Outcome::new(&json, text) })
+}
+
+/// In which lengths are told.
+pub(super) fn unit_of(metadata: &Metadata) -> String {
+    metadata.options.get("units").map_or("model units".into(), |unit| shown(unit))
 }
 
 /// Holds the file against the model that it was built from.
@@ -137,7 +159,7 @@ fn measure(
 }
 
 /// The file says how much was read, and how large that was.
-fn expect_same(model: &Batch, metadata: &Metadata, bounds: &Aabb, problems: &mut Problems) {
+pub(super) fn expect_same(model: &Batch, metadata: &Metadata, bounds: &Aabb, problems: &mut Problems) {
     let [vertices, triangles] = [model.vertices.positions.len(), model.triangles.len()].map(|count| count as u64);
     let found = match triangles {
         0 => InputCounts { points: vertices, ..InputCounts::default() },
@@ -212,7 +234,7 @@ fn count_referenced(mesh: &Mesh) -> u64 {
 }
 
 /// Reads a whole model into memory, with its materials. Which way was up, and in which unit, when it was built is of no matter here.
-fn read_model(
+pub(super) fn read_model(
     originals: &Inputs,
     up: UpAxis,
     work: &dyn Progress,

@@ -1,9 +1,10 @@
 //! The judge of finished files: shares nothing with the builders but `geom` and `format`, and walks a file its own slow way.
 //!
 //! [`structure::check`] reads every byte and every tree bit; [`measure::against`] holds the decoded spheres against the
-//! original mesh, diced or not, [`cloud::against_points`] against the original point cloud.
+//! original mesh, diced or not, [`cloud::against_points`] against the original point cloud. Hybrid files have [`hybrid`].
 
 pub mod cloud;
+pub mod hybrid;
 pub mod measure;
 mod nearest;
 mod sampled;
@@ -29,7 +30,8 @@ pub struct Problems {
 }
 
 impl Problems {
-    pub(crate) fn add(&mut self, problem: impl FnOnce() -> String) {
+    /// One more.
+    pub fn add(&mut self, problem: impl FnOnce() -> String) {
         self.count += 1;
         if self.told.len() < MOST_PROBLEMS {
             self.told.push(problem());

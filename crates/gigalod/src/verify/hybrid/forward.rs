@@ -1,0 +1,65 @@
+//! From the original to what is drawn of it: each triangle of the original must be near what is drawn at each level.
+//!
+//! A triangle is held against the node that is nearest to its middle, since it is the builder's choice which of two that meet there
+//! stands for it.
+
+use super::choice::Pass;
+use super::cut::Near;
+use super::sample::{LEAST_PARTS, area, ball, grid, parts, point};
+use super::tally::{Found, Tally, Way};
+use crate::verify::measure::Steps;
+use gigalod_format::hybrid::NodeId;
+use gigalod_reference::Mesh;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Triangles that one task measures: fixed, so that sums are, too.
+const CHUNK: usize = 4096;
+
+/// Measures the whole original, or what of it a pass asks for.
+pub(super) fn measure(original: &Mesh, pass: &Pass, near: &Near<'_>, tally: &Tally<'_>, steps: &Steps<'_>) -> Found {
+    let chunk = |triangles: &[[u32; 3]]| {
+        let mut found = Found::default();
+        for triangle in triangles {
+            steps.step();
+            let corners = triangle.map(|corner| original.positions()[corner as usize]);
+            add(&mut found, corners, pass, near, tally);
+        }
+        found
+    };
+    let found: Vec<Found> = original.triangles().par_chunks(CHUNK).map(chunk).collect();
+    found.into_iter().fold(Found::default(), |mut all, found| {
+        all.join(found);
+        all
+    })
+}
+
+fn add(found: &mut Found, corners: [DVec3; 3], pass: &Pass, near: &Near<'_>, tally: &Tally<'_>) {
+    let (middle, radius) = ball(corners);
+    if pass.region.as_ref().is_some_and(|region| !region.holds(middle)) {
+        return;
+    }
+    // Where nothing is drawn at all, whoever is first answers for it.
+    let (distance, node) = near.nearest(middle).unwrap_or_else(|| nothing(pass));
+    let record = tally.record(node);
+    let is_leaf = record.children == 0;
+    if is_leaf != pass.is_of_leaves {
+        return;
+    }
+    // No point of the triangle can be farther away than that.
+    if !is_leaf && distance + radius <= tally.largest(node) {
+        return;
+    }
+    // A leaf's error is a fraction of its triangles' size, everywhere.
+    let parts = if is_leaf { LEAST_PARTS } else { parts(corners, f64::from(record.error_geo)) };
+    let weight = if is_leaf { area(corners) } else { 0.0 };
+    for (weights, share) in grid(parts) {
+        let at = point(corners, weights);
+        let (distance, _) = near.nearest(at).unwrap_or_else(|| nothing(pass));
+        found.add(tally, node, Way::Forward, at, distance, weight * share);
+    }
+}
+
+fn nothing(pass: &Pass) -> (f64, NodeId) {
+    (f64::MAX, pass.nodes[0])
+}
