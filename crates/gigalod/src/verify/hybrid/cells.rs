@@ -16,6 +16,8 @@ pub(super) struct Cells<'a> {
     records: &'a [NodeRecord],
     origin: DVec3,
     edge: f64,
+    /// Number of the finest level.
+    finest: u32,
     nodes: HashMap<Cell, NodeId>,
 }
 
@@ -24,7 +26,8 @@ impl<'a> Cells<'a> {
     /// A page cannot be read.
     pub(super) fn of(file: &'a HybridFile) -> Result<Self, FormatError> {
         let (root, records) = (file.skeleton().root(), file.skeleton().nodes());
-        let mut cells = Self { records, origin: root.origin, edge: root.edge, nodes: HashMap::new() };
+        let mut cells =
+            Self { records, origin: root.origin, edge: root.edge, finest: root.levels - 1, nodes: HashMap::new() };
         let leaf = |number: u32| match records[number as usize].children {
             0 => cells.of_leaf(file, NodeId(number)),
             _ => Ok(None),
@@ -65,7 +68,7 @@ impl<'a> Cells<'a> {
     pub(super) fn node(&self, corners: [DVec3; 3], level: Option<u32>) -> Option<NodeId> {
         // As builders see it: relative to the origin, in single precision.
         let (middle, _) = ball(corners.map(|corner| (corner - self.origin).as_vec3().as_dvec3()));
-        let finest = level.unwrap_or_else(|| self.records.iter().map(|record| record.level).max().unwrap_or(0));
+        let finest = level.unwrap_or(self.finest);
         let known = (0..=finest).rev().find_map(|level| self.nodes.get(&self.cell(middle, level)).copied())?;
         let record = &self.records[known.0 as usize];
         (record.children == 0 || Some(record.level) == level).then_some(known)
