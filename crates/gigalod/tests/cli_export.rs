@@ -6,7 +6,6 @@ mod cli_support;
 mod hybrid;
 
 use cli_support::statue;
-use gigalod::geom::color::LINEAR_OF_SRGB8;
 use gigalod::import::{Batch, read_all};
 use gigalod_reference::Bvh;
 use gigalod_reference::distance::{Sampling, two_sided};
@@ -56,16 +55,17 @@ fn what_is_exported_is_read_again_in_all_three_formats() {
         found.push(model);
     }
     let [ply, obj, glb] = &found[..] else { unreachable!() };
-    assert_eq!([&obj.triangles, &glb.triangles], [&ply.triangles; 2]);
-    assert_eq!(obj.vertices.positions, ply.vertices.positions);
+    assert!([&obj.triangles, &glb.triangles] == [&ply.triangles; 2]);
+    // Both are in single precision, but one of them in decimals.
+    let narrow = |all: &Batch| all.vertices.positions.iter().map(|at| at.as_vec3()).collect::<Vec<_>>();
+    assert!(narrow(obj) == narrow(ply));
     let apart = |a: &DVec3, b: &DVec3| a.distance(*b);
     let most = |all: &Batch| {
         all.vertices.positions.iter().zip(&ply.vertices.positions).map(|(a, b)| apart(a, b)).fold(0.0, f64::max)
     };
     assert!(most(glb) < 1e-6, "{}", most(glb));
-    assert_eq!([&obj.vertices.colors, &glb.vertices.colors], [&ply.vertices.colors; 2]);
+    assert!([&obj.vertices.colors, &glb.vertices.colors] == [&ply.vertices.colors; 2]);
     assert!(ply.vertices.colors.iter().any(|color| *color != ply.vertices.colors[0]));
-    assert_eq!(LINEAR_OF_SRGB8.len(), 256);
     for (one, other) in glb.vertices.normals.iter().zip(&ply.vertices.normals) {
         assert!(one.distance(*other) < 1e-5 && (one.length() - 1.0).abs() < 1e-5, "{one} {other}");
     }
@@ -77,7 +77,7 @@ fn a_larger_error_leaves_less_and_keeps_to_it() {
     let at = |name: &str| folder.path().join(name);
     run!["build", statue().ply, "-o", at("a.glod"), "--as", "hybrid", "--tmax", "1024", "--appearance", "off"].done();
     let mut before = u64::MAX;
-    for error in ["0", "0.002", "0.01", "1000"] {
+    for error in ["0", "0.012", "0.03", "1000"] {
         let json = run!["export", at("a.glod"), "-o", at("out.ply"), "--error", error, "--json"].done().json();
         let triangles = json["triangles"].as_u64().unwrap();
         assert!(triangles > 0 && triangles < before, "{triangles} after {before}");
@@ -98,7 +98,7 @@ fn splats_are_exported_as_points() {
     let info = run!["info", at("a.glod"), "--json"].done().json();
     for name in ["out.ply", "out.glb", "out.obj"] {
         let json = run!["export", at("a.glod"), "-o", at(name), "--json"].done().json();
-        assert_eq!((&json["triangles"], &json["vertices"]), (&0.into(), &0.into()));
+        assert_eq!((&json["triangles"], &json["vertices"]), (&0.into(), &0.into()), "{name}");
         let leaves = info["leaves"].as_u64().unwrap() - info["repeated"].as_u64().unwrap();
         assert!(json["points"].as_u64().unwrap().abs_diff(leaves) <= 2, "{json}, {leaves}");
         if name != "out.obj" {
@@ -109,7 +109,7 @@ fn splats_are_exported_as_points() {
             );
         }
     }
-    let fewer = run!["export", at("a.glod"), "-o", at("out.ply"), "--error", "0.1", "--json"].done().json();
+    let fewer = run!["export", at("a.glod"), "-o", at("out.ply"), "--error", "0.3", "--json"].done().json();
     assert!(fewer["points"].as_u64().unwrap() * 4 < info["leaves"].as_u64().unwrap(), "{fewer}");
 }
 

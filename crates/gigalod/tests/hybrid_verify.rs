@@ -95,18 +95,23 @@ fn what_is_missing_in_a_node_is_found_from_the_original() {
 fn records_that_contradict_their_page_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let (file, _) = statue(folder.path());
-    let found = |change: &dyn Fn(&mut Forged, usize)| {
+    let found = |change: &dyn Fn(&mut Forged)| {
         let mut forged = Forged::of(&file);
-        let node = forged.inner();
-        change(&mut forged, node);
+        change(&mut forged);
         let told = check(&forged.open(), &mut |_| {}).1.told;
         assert!(!told.is_empty());
         told.join("\n")
     };
-    let cone = found(&|forged, node| forged.records[node].cone_axis = forged.records[node].cone_axis.map(|x| -x));
-    let narrow = found(&|forged, node| forged.records[node].cone_sine = 0.01);
+    let cone = found(&|forged| {
+        let node = forged.with_cone();
+        forged.records[node].cone_axis = forged.records[node].cone_axis.map(|x| -x);
+    });
+    let narrow = found(&|forged| {
+        let node = forged.with_cone();
+        forged.records[node].cone_sine = 0.01;
+    });
     assert!(cone.contains("cone") && narrow.contains("cone"), "{cone}\n{narrow}");
-    let error = found(&|forged, _| {
+    let error = found(&|forged| {
         let root = &mut forged.records[0];
         root.error_geo *= 4.0;
         root.error_total = root.error_total.max(root.error_geo);

@@ -29,13 +29,13 @@ pub fn splats(
     let root = file.skeleton().root();
     let mut plan = Plan {
         written: Written { points: nodes.len() as u64, ..Written::default() },
-        has_colors: tree.nodes.first().is_some_and(|node| node.color.is_some()),
+        has_colors: root.has_colors,
         is_wide: false,
         origin: root.origin,
         up: root.up,
         boxes: [Plan::EMPTY_BOX; 2],
     };
-    // Twice as coarse as what spheres are told in.
+    // Centres are in single precision, relative to the middle. Far from there it does not suffice for the model's coordinates.
     let largest = root.bounds.min.abs().max(root.bounds.max.abs()).max_element();
     plan.is_wide = largest > 2.0 * f64::from(root.sphere.radius);
     for node in &nodes {

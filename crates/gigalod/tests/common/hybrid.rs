@@ -74,14 +74,19 @@ impl Forged {
         }
     }
 
-    /// Some inner node with a cone, below the root.
+    /// The fullest inner node below the root.
     pub(crate) fn inner(&self) -> usize {
-        let is_inner = |record: &NodeRecord| record.level > 0 && record.children > 0 && record.cone_sine < 0.9;
-        let fullest = |number: &usize| self.records[*number].triangles;
-        (0..self.records.len())
-            .filter(|number| is_inner(&self.records[*number]))
-            .max_by_key(fullest)
-            .expect("there is one")
+        self.fullest(|record| record.level > 0 && record.children > 0)
+    }
+
+    /// The fullest node with a cone that leaves something out.
+    pub(crate) fn with_cone(&self) -> usize {
+        self.fullest(|record| record.cone_sine < 1.0 && record.triangles > 0)
+    }
+
+    fn fullest(&self, is_asked: impl Fn(&NodeRecord) -> bool) -> usize {
+        let all = (0..self.records.len()).filter(|number| is_asked(&self.records[*number]));
+        all.max_by_key(|number| self.records[*number].triangles).expect("there is one")
     }
 
     /// Removes vertices that no triangle uses.

@@ -36,8 +36,8 @@ fn mixed(number: u64) -> u64 {
 pub(super) struct Pass {
     /// Whole cut, or as much of it as can be nearest to what is asked.
     pub(super) nodes: Vec<NodeId>,
-    /// Leaves, or the inner nodes of a level among leaves of levels above.
-    pub(super) is_of_leaves: bool,
+    /// The inner nodes of this level are measured, among leaves of levels above; or else leaves.
+    pub(super) level: Option<u32>,
     /// Where the original is asked; everywhere if there is none.
     pub(super) region: Option<Region>,
 }
@@ -70,7 +70,7 @@ fn pass(skeleton: &Skeleton, chosen: &[bool], level: Option<u32>) -> Option<Pass
     let nodes = numbered().filter(|(record, ..)| {
         is_in_cut(record) && region.as_ref().is_none_or(|region| region.is_beside(box_of(record, skeleton)))
     });
-    Some(Pass { nodes: nodes.map(|(.., number)| NodeId(number)).collect(), is_of_leaves: level.is_none(), region })
+    Some(Pass { nodes: nodes.map(|(.., number)| NodeId(number)).collect(), level, region })
 }
 
 /// Boxes of several nodes.

@@ -1,8 +1,9 @@
 //! From the original to what is drawn of it: each triangle of the original must be near what is drawn at each level.
 //!
-//! A triangle is held against the node that is nearest to its middle, since it is the builder's choice which of two that meet there
-//! stands for it.
+//! A triangle is held against the error of the node that stands for it. How far it is from what is drawn may be measured to any node of
+//! the level.
 
+use super::cells::Cells;
 use super::choice::Pass;
 use super::cut::Near;
 use super::sample::{LEAST_PARTS, area, ball, grid, parts, point};
@@ -17,13 +18,19 @@ use rayon::prelude::*;
 const CHUNK: usize = 4096;
 
 /// Measures the whole original, or what of it a pass asks for.
-pub(super) fn measure(original: &Mesh, pass: &Pass, near: &Near<'_>, tally: &Tally<'_>, steps: &Steps<'_>) -> Found {
+pub(super) fn measure(
+    original: &Mesh,
+    (pass, near): (&Pass, &Near<'_>),
+    cells: &Cells<'_>,
+    tally: &Tally<'_>,
+    steps: &Steps<'_>,
+) -> Found {
     let chunk = |triangles: &[[u32; 3]]| {
         let mut found = Found::default();
         for triangle in triangles {
             steps.step();
             let corners = triangle.map(|corner| original.positions()[corner as usize]);
-            add(&mut found, corners, pass, near, tally);
+            add(&mut found, corners, (pass, near), cells, tally);
         }
         found
     };
@@ -34,16 +41,17 @@ pub(super) fn measure(original: &Mesh, pass: &Pass, near: &Near<'_>, tally: &Tal
     })
 }
 
-fn add(found: &mut Found, corners: [DVec3; 3], pass: &Pass, near: &Near<'_>, tally: &Tally<'_>) {
+fn add(found: &mut Found, corners: [DVec3; 3], (pass, near): (&Pass, &Near<'_>), cells: &Cells<'_>, tally: &Tally<'_>) {
     let (middle, radius) = ball(corners);
     if pass.region.as_ref().is_some_and(|region| !region.holds(middle)) {
         return;
     }
     // Where nothing is drawn at all, whoever is first answers for it.
-    let (distance, node) = near.nearest(middle).unwrap_or_else(|| nothing(pass));
+    let (distance, nearest) = near.nearest(middle).unwrap_or_else(|| nothing(pass));
+    let node = cells.node(corners, pass.level).unwrap_or(nearest);
     let record = tally.record(node);
     let is_leaf = record.children == 0;
-    if is_leaf != pass.is_of_leaves {
+    if is_leaf != pass.level.is_none() {
         return;
     }
     // No point of the triangle can be farther away than that.

@@ -1,5 +1,6 @@
 //! How far nodes are from the original, both ways.
 
+use super::cells::Cells;
 use super::choice::{chosen, passes};
 use super::cut::Cut;
 use super::tally::{Found, Tally, Violation};
@@ -51,10 +52,11 @@ pub fn against(file: &HybridFile, original: &Mesh, at: &(dyn Fn(u64) + Sync)) ->
     let is_chosen = chosen(records, original.triangles().len());
     let tally = Tally::new(records);
 
+    let cells = Cells::of(file)?;
     let mut found = Found::default();
     for pass in passes(file.skeleton(), &is_chosen) {
         let cut = Cut::of(file, &pass.nodes)?;
-        found.join(forward::measure(original, &pass, &cut.near(), &tally, &steps));
+        found.join(forward::measure(original, (&pass, &cut.near()), &cells, &tally, &steps));
     }
     let forward_rms = found.rms();
     let chosen: Vec<NodeId> = (0..).map(NodeId).zip(&is_chosen).filter(|(_, is)| **is).map(|(node, _)| node).collect();

@@ -6,6 +6,7 @@
 //! `sample` where triangles are measured, `choice` which nodes are where they are too many.
 
 mod backward;
+mod cells;
 mod choice;
 mod cut;
 mod forward;
