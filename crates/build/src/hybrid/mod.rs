@@ -86,6 +86,11 @@ impl Shape {
         self.edge / (1u64 << (level + self.cell_bits)) as f64
     }
 
+    /// No position that was read is farther from what it became in local space, as `f32`.
+    fn rounding(&self) -> f32 {
+        simplify::up(3f64.sqrt() * self.edge / f64::from(1 << 24))
+    }
+
     /// Largest error of a patch before it is rounded to the grid.
     fn limit(&self, level: u32) -> f64 {
         let most_moved = 0.5 * 3f64.sqrt() * 1.000_001 * self.step(level);

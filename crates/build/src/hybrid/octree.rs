@@ -86,7 +86,7 @@ pub(super) fn split(pieces: &[Piece], cell: Cell, shape: &Shape) -> [Vec<Piece>;
 }
 
 fn leaf(pieces: &[Piece], cell: Cell, shape: &Shape) -> Raised {
-    let patch = weld::patch_of(pieces);
+    let patch = weld::patch_of(pieces, shape.rounding());
     let made = round::round(&patch, cell, shape, round::Place::Leaf);
     Raised { patch, nodes: vec![made] }
 }

@@ -2,11 +2,12 @@
 
 use super::Shape;
 use super::cell::Cell;
-use super::patch::{Patch, Vertex, total};
+use super::patch::{Face, Patch, Vertex, total};
 use super::points::Small;
 use super::simplify::up;
 use gigalod_format::hybrid::{NodeRecord, Page};
 use glam::{DVec3, Vec3};
+use std::collections::BTreeSet;
 
 /// A node that is finished, but for its place in the file.
 #[derive(Clone, Debug)]
@@ -41,6 +42,7 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     let mut cone = Cone::default();
     let mut names = Names { names: vec![u32::MAX; patch.vertices.len()], used: Vec::new() };
     let mut page = Page::default();
+    let mut flattened = Vec::new();
     for (number, face) in patch.faces.iter().enumerate() {
         let corners = face.corners.map(|corner| steps[corner as usize]);
         let geo = f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max);
@@ -52,6 +54,7 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
         errors.add(up(geo), face.app);
         let [a, b, c] = corners;
         if a == b || b == c || c == a {
+            flattened.push((corners, face));
             continue;
         }
         cone.add(corners);
@@ -66,6 +69,15 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
         }
     }
     let mut reach = small.reach;
+    // What rounding has flattened is drawn by what lies beside it, or else as points.
+    let bare = bare(&flattened, &page, &placed);
+    for (at, face, corner, length) in bare {
+        let half = 0.5 * length * step;
+        errors.add(up(f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max) + half), face.app);
+        cone.add_any();
+        reach = reach.max(half);
+        placed.push((at, patch.vertices[face.corners[corner] as usize]));
+    }
     for spot in &patch.spots {
         let at = grid(spot.vertex.at);
         let away = away(at, spot.vertex.at);
@@ -96,6 +108,37 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
         checksum: 0,
     };
     Made { cell, record, page }
+}
+
+/// Corners of flattened faces that nothing else keeps: place, face, number of the corner, and the length in steps of what is left of the
+/// face, where no other face has it as an edge.
+fn bare<'a>(
+    flattened: &[([[i32; 3]; 3], &'a Face)],
+    page: &Page,
+    placed: &[([i32; 3], Vertex)],
+) -> Vec<([i32; 3], &'a Face, usize, f64)> {
+    if flattened.is_empty() {
+        return Vec::new();
+    }
+    let mut places: BTreeSet<[i32; 3]> = placed.iter().map(|(at, _)| *at).collect();
+    let mut edges: BTreeSet<[[i32; 3]; 2]> = BTreeSet::new();
+    for triangle in &page.triangles {
+        let [a, b, c] = triangle.map(|corner| placed[corner as usize].0);
+        edges.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]));
+    }
+    let mut bare = Vec::new();
+    for (corners, face) in flattened {
+        let [a, b, c] = *corners;
+        let (from, to) = if a == b { (a, c) } else { (a, b) };
+        let is_edge = from == to || edges.contains(&[from.min(to), from.max(to)]);
+        let length = DVec3::from_array([0, 1, 2].map(|axis| f64::from(from[axis] - to[axis]))).length();
+        for (number, at) in corners.iter().enumerate() {
+            if places.insert(*at) {
+                bare.push((*at, *face, number, if is_edge { 0.0 } else { length }));
+            }
+        }
+    }
+    bare
 }
 
 /// Puts vertices into a page; returns the smallest place, and the extent from there.

@@ -42,8 +42,8 @@ impl Hasher for PlaceHasher {
     }
 }
 
-/// A patch of triangles as they were read: nothing is off yet.
-pub(super) fn patch_of(pieces: &[Piece]) -> Patch {
+/// A patch of triangles as they were read, but for `rounding`.
+pub(super) fn patch_of(pieces: &[Piece], rounding: f32) -> Patch {
     let mut patch = Patch {
         vertices: Vec::with_capacity(pieces.len() / 2),
         faces: Vec::with_capacity(pieces.len()),
@@ -65,7 +65,7 @@ pub(super) fn patch_of(pieces: &[Piece]) -> Patch {
                 patch.vertices.len() as u32 - 1
             });
         }
-        patch.faces.push(Face { corners, geo: 0.0, app: 0.0 });
+        patch.faces.push(Face { corners, geo: rounding, app: 0.0 });
     }
     patch
 }
