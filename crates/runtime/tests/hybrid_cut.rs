@@ -327,9 +327,9 @@ fn records_that_lie_end_in_a_picture_that_says_so() {
     let inner = honest.records.iter().rposition(|record| record.children > 0).unwrap();
     /// What it says of a record.
     type Lie = fn(&mut NodeRecord);
-    // Children are where they are: the format has no numbers of them to lie with.
+    // Where children are, the format has no numbers to lie with.
     let lies: [(&str, Lie); 2] = [
-        ("nowhere", |record| (record.level, record.min_steps) = (u32::MAX, [i32::MIN; 3])),
+        ("no cone", |record| (record.cone_axis, record.cone_sine) = ([f32::NAN; 3], f32::NAN)),
         ("no number", |record| (record.error_geo, record.error_total) = (f32::NAN, f32::NAN)),
     ];
     for (name, lie) in lies {
