@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 const BITS: u32 = 10;
 const ORIGIN: DVec3 = DVec3::new(3.0, -1.0, 8.0);
-const ERROR: f32 = 1e-4;
+/// As files keep it.
+const ERROR: f32 = 1.0 / 8192.0;
 const NORMAL_BITS: u32 = 8;
 
 /// A root, and a leaf for each of its eighths with triangles all over it: the same for the same.

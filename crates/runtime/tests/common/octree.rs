@@ -72,6 +72,7 @@ impl Octree {
             statistics.count(&prepared);
             *page = prepared.into_page();
             record.borders = page.borders.len() as u32;
+            *record = record.as_stored();
         }
         Self { root, records, pages, model: Model::of(&statistics) }
     }
