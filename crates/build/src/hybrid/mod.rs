@@ -93,7 +93,8 @@ impl Shape {
 
     /// Largest error of a patch before it is rounded to the grid.
     fn limit(&self, level: u32) -> f64 {
-        let most_moved = 0.5 * 3f64.sqrt() * 1.000_001 * self.step(level);
+        // With what moves aside where rounding has flattened a face: a step along one axis.
+        let most_moved = (1.5f64 * 1.5 + 0.5).sqrt() * 1.000_001 * self.step(level);
         self.edge / (1u64 << level) as f64 / f64::from(self.resolution) - most_moved
     }
 }

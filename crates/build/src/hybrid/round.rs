@@ -62,6 +62,19 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     }
     let mut placed: Vec<([i32; 3], Vertex)> = Vec::with_capacity(names.used.len());
     placed.extend(names.used.iter().map(|vertex| (steps[*vertex as usize], patch.vertices[*vertex as usize])));
+    // What rounding has flattened is drawn by what lies beside it, or else for itself.
+    let bare = Bare::of(&flattened, &page, &placed);
+    for (corners, face) in &bare.needles {
+        let first = placed.len() as u32;
+        let mut farthest = 0.0f64;
+        for (at, corner) in corners.iter().zip(face.corners) {
+            farthest = farthest.max(away(*at, patch.vertices[corner as usize].at));
+            placed.push((*at, patch.vertices[corner as usize]));
+        }
+        errors.add(up(f64::from(face.geo) + farthest), face.app);
+        cone.add(*corners);
+        page.triangles.push([first, first + 1, first + 2]);
+    }
     let vertices = placed.len();
     for (vertex, is_point) in small.is_point.iter().enumerate() {
         if *is_point {
@@ -69,14 +82,11 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
         }
     }
     let mut reach = small.reach;
-    // What rounding has flattened is drawn by what lies beside it, or else as points.
-    let bare = bare(&flattened, &page, &placed);
-    for (at, face, corner, length) in bare {
-        let half = 0.5 * length * step;
-        errors.add(up(f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max) + half), face.app);
+    for (at, face) in &bare.points {
+        // Its error was counted with all faces'.
+        reach = reach.max(face.corners.map(moved).into_iter().fold(0.0, f64::max));
         cone.add_any();
-        reach = reach.max(half);
-        placed.push((at, patch.vertices[face.corners[corner] as usize]));
+        placed.push((*at, patch.vertices[face.corners[0] as usize]));
     }
     for spot in &patch.spots {
         let at = grid(spot.vertex.at);
@@ -110,35 +120,48 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     Made { cell, record, page }
 }
 
-/// Corners of flattened faces that nothing else keeps: place, face, number of the corner, and the length in steps of what is left of the
-/// face, where no other face has it as an edge.
-fn bare<'a>(
-    flattened: &[([[i32; 3]; 3], &'a Face)],
-    page: &Page,
-    placed: &[([i32; 3], Vertex)],
-) -> Vec<([i32; 3], &'a Face, usize, f64)> {
-    if flattened.is_empty() {
-        return Vec::new();
-    }
-    let mut places: BTreeSet<[i32; 3]> = placed.iter().map(|(at, _)| *at).collect();
-    let mut edges: BTreeSet<[[i32; 3]; 2]> = BTreeSet::new();
-    for triangle in &page.triangles {
-        let [a, b, c] = triangle.map(|corner| placed[corner as usize].0);
-        edges.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]));
-    }
-    let mut bare = Vec::new();
-    for (corners, face) in flattened {
-        let [a, b, c] = *corners;
-        let (from, to) = if a == b { (a, c) } else { (a, b) };
-        let is_edge = from == to || edges.contains(&[from.min(to), from.max(to)]);
-        let length = DVec3::from_array([0, 1, 2].map(|axis| f64::from(from[axis] - to[axis]))).length();
-        for (number, at) in corners.iter().enumerate() {
-            if places.insert(*at) {
-                bare.push((*at, *face, number, if is_edge { 0.0 } else { length }));
-            }
+/// Flattened faces that nothing else keeps: of one place, to be points; of two, to be triangles again, with one corner a step aside.
+#[derive(Default)]
+struct Bare<'a> {
+    points: Vec<([i32; 3], &'a Face)>,
+    needles: Vec<([[i32; 3]; 3], &'a Face)>,
+}
+
+impl<'a> Bare<'a> {
+    fn of(flattened: &[([[i32; 3]; 3], &'a Face)], page: &Page, placed: &[([i32; 3], Vertex)]) -> Self {
+        let mut bare = Self::default();
+        if flattened.is_empty() {
+            return bare;
         }
+        let mut places: BTreeSet<[i32; 3]> = placed.iter().map(|(at, _)| *at).collect();
+        let mut edges: BTreeSet<[[i32; 3]; 2]> = BTreeSet::new();
+        for triangle in &page.triangles {
+            let [a, b, c] = triangle.map(|corner| placed[corner as usize].0);
+            edges.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]));
+        }
+        for (corners, face) in flattened {
+            let [a, b, c] = *corners;
+            if a == b && b == c {
+                if places.insert(a) {
+                    bare.points.push((a, face));
+                }
+                continue;
+            }
+            let (from, to) = if a == b { (a, c) } else { (a, b) };
+            if !edges.insert([from.min(to), from.max(to)]) {
+                continue;
+            }
+            places.extend([from, to]);
+            // The corner that is where another is goes aside, along the axis in which the needle is shortest.
+            let twin = if a == b || c == b { 1 } else { 2 };
+            let along = [0, 1, 2].map(|axis| (to[axis] - from[axis]).abs());
+            let axis = (0..3).min_by_key(|axis| along[*axis]).expect("there are three");
+            let mut corners = *corners;
+            corners[twin][axis] += 1;
+            bare.needles.push((corners, face));
+        }
+        bare
     }
-    bare
 }
 
 /// Puts vertices into a page; returns the smallest place, and the extent from there.

@@ -119,6 +119,15 @@ fn merge(patch: &mut Patch, edges: &[Edge], limit: f64) {
             shortest[*vertex as usize] = shortest[*vertex as usize].min(length);
         }
     }
+    // Two of one face would flatten it, and with it perhaps the last of a small shell.
+    let mut joined: Hashed<u64, ()> = Hashed::default();
+    for Face { corners: [a, b, c], .. } in faces.iter() {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            if shortest[*p as usize].is_finite() && shortest[*q as usize].is_finite() {
+                joined.insert(u64::from(*p.min(q)) << 32 | u64::from(*p.max(q)), ());
+            }
+        }
+    }
     let mut grid = Grid::new(reach);
     let on_border: Vec<u32> = (0..vertices.len() as u32).filter(|v| shortest[*v as usize].is_finite()).collect();
     on_border.iter().for_each(|vertex| grid.put(vertices[*vertex as usize].at, *vertex));
@@ -143,7 +152,12 @@ fn merge(patch: &mut Patch, edges: &[Edge], limit: f64) {
         let (one, other) = (vertices[*a as usize], vertices[b as usize]);
         let half = (one.at - other.at).length() * 0.5;
         let is_near = 2.0 * half <= NEAR * shortest[*a as usize].min(shortest[b as usize]);
-        if !is_near || 2.0 * half > reach || f64::from(most[*a as usize].max(most[b as usize])) + half > limit {
+        let are_joined = joined.contains_key(&(u64::from(*a) << 32 | u64::from(b)));
+        if are_joined
+            || !is_near
+            || 2.0 * half > reach
+            || f64::from(most[*a as usize].max(most[b as usize])) + half > limit
+        {
             continue;
         }
         names[b as usize] = *a;
