@@ -405,7 +405,7 @@ fn a_click_on_a_models_name_looks_at_it() {
     let home = person.viewer().own_viewpoint();
     person.viewer().steer(&Input::Pan { by_px: DVec2::new(90.0, 40.0) }, 0.0);
     person.viewer().steer(&Input::Orbit { by_px: DVec2::new(50.0, 0.0) }, 0.0);
-    let leaves = person.files.statue.file.skeleton().root().leaves;
+    let leaves = person.files.statue.file.splats().expect("a statue of splats").skeleton().root().leaves;
     person.clicks_on(&format!("statue.glod, {} splats", crate::panel::count(leaves)));
     let now = person.viewer().own_viewpoint();
     assert!((now.target - home.target).length() < 1e-6, "at its middle");

@@ -153,6 +153,7 @@ impl BuildOptions {
     }
 
     /// The same as arguments of `gigalod build`.
+    #[cfg(feature = "view")]
     pub(crate) fn recipe_arguments(&self) -> Vec<String> {
         let recipe = self.recipe();
         let option = |line: &str| line.split_once(' ').map(|(name, value)| [format!("--{name}"), value.to_string()]);

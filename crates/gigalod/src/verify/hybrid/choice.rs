@@ -73,12 +73,15 @@ fn pass(skeleton: &Skeleton, chosen: &[bool], level: Option<u32>) -> Option<Pass
     Some(Pass { nodes: nodes.map(|(.., number)| NodeId(number)).collect(), level, region })
 }
 
+/// Boxes in each cube of a lattice.
+type Cubes = HashMap<[i64; 3], Vec<u32>>;
+
 /// Boxes of several nodes.
 pub(super) struct Region {
     origin: DVec3,
     boxes: Vec<[DVec3; 2]>,
     /// Lattices of cubes: their edge, and the boxes in each.
-    lattices: Vec<(f64, HashMap<[i64; 3], Vec<u32>>)>,
+    lattices: Vec<(f64, Cubes)>,
     /// What is farther from a box cannot be nearest to what is in it, in a file that is right.
     margin: f64,
 }
