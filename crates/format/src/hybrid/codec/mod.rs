@@ -6,7 +6,7 @@
 //!
 //! What always holds: any page decodes to itself, in its own order, under any model; any bytes decode to a page or to an error.
 //!
-//! Start at [`Prepared`] for writing and [`decode`] for reading.
+//! Start at [`Prepared`] for writing and `decode` for reading.
 
 mod decode;
 mod front;

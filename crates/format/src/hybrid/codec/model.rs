@@ -123,7 +123,7 @@ impl Model {
         (0..SIZES).min_by_key(bits).unwrap_or(0)
     }
 
-    /// The tables in order: see [`crate::rans::Table::put`].
+    /// The tables in order: see `rans::Table::put`.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         for (table, probabilities) in self.tables.iter().enumerate() {

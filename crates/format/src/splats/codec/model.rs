@@ -149,7 +149,7 @@ impl Model {
         &self.tables
     }
 
-    /// The tables of all contexts, in order: see [`crate::rans::Table::put`].
+    /// The tables of all contexts, in order: see `rans::Table::put`.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         for (context, table) in self.tables.iter().enumerate() {
