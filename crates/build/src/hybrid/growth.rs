@@ -88,7 +88,12 @@ impl Growth {
                 Task::Set(cell, pieces) if cell.level == MOST_LEVEL => {
                     return Err(BuildError::Crowd { vertices: pieces.len(), most: at_once });
                 }
-                Task::Set(cell, pieces) => self.split(cell, pieces, shape, plan).map_err(BuildError::Scratch)?,
+                Task::Set(cell, pieces) => {
+                    let vertices = pieces.len();
+                    if !self.split(cell, pieces, shape, plan).map_err(BuildError::Scratch)? {
+                        return Err(BuildError::Crowd { vertices, most: at_once });
+                    }
+                }
                 Task::Join(cell, children) => {
                     let patches = self.patches.split_off(self.patches.len() - children);
                     let children = patches.into_iter().map(|patch| Raised { patch, nodes: vec![] }).collect();
@@ -126,14 +131,16 @@ impl Growth {
         Ok(())
     }
 
-    /// Sorts a set into eight.
-    fn split(&mut self, cell: Cell, pieces: Spool<Piece>, shape: &Shape, plan: &MemoryPlan<'_>) -> io::Result<()> {
+    /// Sorts a set into eight; false where something in it is too large for that.
+    fn split(&mut self, cell: Cell, pieces: Spool<Piece>, shape: &Shape, plan: &MemoryPlan<'_>) -> io::Result<bool> {
         let mut sets = Vec::new();
         for _ in 0..8 {
             self.sets += 1;
             sets.push(Spool::named(&plan.place_in_files(), &format!("set{}", self.sets))?);
         }
+        let mut fit = true;
         pieces.for_each_piece(MemoryPlan::PIECE, |_, piece| {
+            fit &= octree::fit_below(piece, cell, shape);
             let parts = octree::split(piece, cell, shape);
             sets.iter_mut().zip(&parts).try_for_each(|(set, part)| set.push(part))
         })?;
@@ -142,7 +149,7 @@ impl Growth {
         let tasks: Vec<Task> = sets.map(|(octant, set)| Task::Set(cell.child(octant as u8), set)).collect();
         self.tasks.push(Task::Join(cell, tasks.len()));
         self.tasks.extend(tasks.into_iter().rev());
-        Ok(())
+        Ok(fit)
     }
 
     /// Keeps the state in a work folder.

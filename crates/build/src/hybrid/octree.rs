@@ -60,7 +60,7 @@ impl<'a> Told<'a> {
 
 /// Raises a cell.
 pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape, told: &Told<'_>) -> Raised {
-    if pieces.len() <= shape.most_triangles || cell.level == MOST_LEVEL {
+    if pieces.len() <= shape.most_triangles || cell.level == MOST_LEVEL || !fit_below(&pieces, cell, shape) {
         told.add(pieces.len());
         return leaf(&pieces, cell, shape);
     }
@@ -73,6 +73,19 @@ pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape, told: &Told<'
         .map(|(octant, pieces)| raise(pieces, cell.child(octant as u8), shape, told))
         .collect();
     join(children, cell, shape)
+}
+
+/// False where a triangle is too large for an eighth of the cell: places are counted from there in a few bits. Then nothing is split.
+pub(super) fn fit_below(pieces: &[Piece], cell: Cell, shape: &Shape) -> bool {
+    const MOST_EDGES: f64 = 8.0;
+    /// A node's places fit into 16 bits where its triangles are at most so many steps long.
+    const MOST_STEPS: f64 = 16_384.0;
+    let edges = MOST_EDGES.min(MOST_STEPS / f64::from(1u32 << shape.cell_bits));
+    let most = (edges * cell.child(0).edge(shape.edge)) as f32;
+    pieces.iter().all(|piece| {
+        let [a, b, c] = piece.at.map(Vec3::from_array);
+        (a.max(b).max(c) - a.min(b).min(c)).max_element() <= most
+    })
 }
 
 /// Pieces of each eighth, in their order.
