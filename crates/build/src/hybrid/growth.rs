@@ -4,7 +4,7 @@
 //! the plan allows; how much that is changes nothing about the nodes. Between any two sets the state can be kept and continued from.
 
 use super::Shape;
-use super::cell::{Cell, MOST_LEVEL};
+use super::cell::Cell;
 use super::nodes::Nodes;
 use super::octree::{self, Piece, Raised};
 use super::patch::{Face, Patch, Spot, Vertex};
@@ -85,7 +85,7 @@ impl Growth {
                     unsaved += pieces.len();
                     self.raise(cell, pieces, shape, phases).map_err(BuildError::Scratch)?;
                 }
-                Task::Set(cell, pieces) if cell.level == MOST_LEVEL => {
+                Task::Set(cell, pieces) if cell.level >= shape.deepest() => {
                     return Err(BuildError::Crowd { vertices: pieces.len(), most: at_once });
                 }
                 Task::Set(cell, pieces) => {

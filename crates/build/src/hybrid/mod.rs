@@ -91,6 +91,11 @@ impl Shape {
         simplify::up(3f64.sqrt() * self.edge / f64::from(1 << 24))
     }
 
+    /// Deepest level: there a node's error is still four times what `f32` positions are off.
+    fn deepest(&self) -> u32 {
+        21u32.saturating_sub(self.resolution.next_power_of_two().ilog2()).min(cell::MOST_LEVEL)
+    }
+
     /// Largest error of a patch before it is rounded to the grid.
     fn limit(&self, level: u32) -> f64 {
         // With what moves aside where rounding has flattened a face: a step along one axis.

@@ -5,7 +5,7 @@
 //! The paper gathers what was simplified two levels below. Here a node gathers its children's patches, whose faces carry their own proven
 //! errors, and goes on from there: half the work, and no error is counted that there is not.
 
-use super::cell::{Cell, MOST_LEVEL};
+use super::cell::Cell;
 use super::patch::{Face, Patch, Vertex};
 use super::round::{self, Made};
 use super::simplify::{Limit, simplify};
@@ -60,7 +60,7 @@ impl<'a> Told<'a> {
 
 /// Raises a cell.
 pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape, told: &Told<'_>) -> Raised {
-    if pieces.len() <= shape.most_triangles || cell.level == MOST_LEVEL || !fit_below(&pieces, cell, shape) {
+    if pieces.len() <= shape.most_triangles || cell.level >= shape.deepest() || !fit_below(&pieces, cell, shape) {
         told.add(pieces.len());
         return leaf(&pieces, cell, shape);
     }
