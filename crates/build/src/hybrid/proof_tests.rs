@@ -11,7 +11,7 @@ use proptest::prelude::*;
 /// Samples along each edge of a triangle.
 const SAMPLES: u32 = 5;
 
-/// The point of a triangle that is nearest: the least over a fine grid of its points, refined; never nearer than the true one.
+/// From a point to a triangle: to its plane where the foot lies inside, else to the nearest of its edges.
 fn distance(at: DVec3, corners: [DVec3; 3]) -> f64 {
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a);
