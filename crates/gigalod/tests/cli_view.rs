@@ -148,7 +148,7 @@ impl Viewing<'_> {
 
     /// The first picture of a model that has to be built: until then there is nothing to take.
     fn takes_picture_when_built(&self) -> PathBuf {
-        let path = self.folder.join("statue-1.png");
+        let path = self.folder.join("splats-1.png");
         waits_until(|| {
             self.presses("p");
             std::thread::sleep(Duration::from_millis(300));
@@ -208,12 +208,12 @@ fn a_rested_picture_is_that_of_render_on_the_screen_and_in_a_file() {
     let Some(screen) = Screen::open() else { return };
     let place = tempfile::tempdir_in(folder()).unwrap();
     let viewing = screen.view(place.path(), [&statue().glod]);
-    let first = viewing.takes_picture("statue-1.png");
+    let first = viewing.takes_picture("splats-1.png");
     viewing.presses("F2");
     viewing.drags(MIDDLE, [150, 60], "1");
     viewing.hand(&["mousemove", "320", "250", "click", "4", "sleep", "0.2", "click", "4"]);
     viewing.drags(MIDDLE, [30, -20], "3");
-    let second = viewing.takes_picture("statue-2.png");
+    let second = viewing.takes_picture("splats-2.png");
     let (width, shown) = read_png(&second);
     assert_eq!(width, WIDTH);
     assert_ne!(shown, read_png(&first).1, "the camera moved");
@@ -287,17 +287,17 @@ fn a_window_survives_what_happens_to_it() {
     let viewing = screen.view(place.path(), [&statue().glod]);
     let window = |does: &[&str]| viewing.hand(&[&["search", "--name", "^Gigalod$"], does].concat());
     viewing.presses("F2");
-    let (_, first) = read_png(&viewing.takes_picture("statue-1.png"));
+    let (_, first) = read_png(&viewing.takes_picture("splats-1.png"));
     // The device is lost, and with it all that lay there.
     viewing.presses("F5");
-    let (_, second) = read_png(&viewing.takes_picture("statue-2.png"));
+    let (_, second) = read_png(&viewing.takes_picture("splats-2.png"));
     assert!(first == second, "another device draws the same");
     waits_until(|| screen.pixels() == second);
     window(&["windowunmap", "--sync"]);
     window(&["windowmap", "--sync", "windowfocus", "--sync"]);
     waits_until(|| screen.pixels() == second);
     window(&["windowsize", "--sync", "640", "400"]);
-    let (width, smaller) = read_png(&viewing.takes_picture("statue-3.png"));
+    let (width, smaller) = read_png(&viewing.takes_picture("splats-3.png"));
     assert_eq!((width, smaller.len()), (640, 640 * 400));
     let corner = || {
         let pixels = screen.pixels();
@@ -316,10 +316,10 @@ fn a_window_that_is_destroyed_ends_the_viewer_with_a_line() {
     let Some(screen) = Screen::open() else { return };
     let place = tempfile::tempdir_in(folder()).unwrap();
     // While it draws, and while it rests.
-    for picture in ["statue-1.png", "statue-2.png"] {
+    for picture in ["splats-1.png", "splats-2.png"] {
         let mut viewing = screen.view(place.path(), [&statue().glod]);
         viewing.takes_picture(picture);
-        if picture == "statue-1.png" {
+        if picture == "splats-1.png" {
             viewing.hand(&["mousemove", "300", "300", "mousedown", "1", "mousemove", "340", "310"]);
         }
         viewing.hand(&["search", "--name", "^Gigalod$", "windowclose"]);

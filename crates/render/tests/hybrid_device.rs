@@ -116,7 +116,7 @@ fn a_node_without_anything_is_nothing() {
     let soup = cube();
     let grid = Grid::around(&soup);
     let whole = soup.model(&grid, 1, Extra::default());
-    let mut record = *whole.file.skeleton().record(gigalod_format::hybrid::NodeId(0));
+    let mut record = whole.record(0);
     (record.vertices, record.triangles, record.borders) = (0, 0, 0);
     let model = Model::new(&grid, false, vec![(record, gigalod_format::hybrid::Page::default())]);
     let draw = model.draw(0, true);

@@ -214,7 +214,7 @@ fn with_gaps(error: f64) -> (Mesh, Model) {
     let whole = soup.model(&grid, 4, Extra { error_geo: error as f32, ..Extra::default() });
     let most = (error * 0.55 / grid.step()) as i32;
     let nodes = whole.pages.iter().enumerate().map(|(at, page)| {
-        let record = *whole.file.skeleton().record(gigalod_format::hybrid::NodeId(at as u32));
+        let record = whole.record(at);
         let mut page = (**page).clone();
         let on_border: std::collections::BTreeSet<u32> = page.borders.as_flattened().iter().copied().collect();
         for vertex in on_border {

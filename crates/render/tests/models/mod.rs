@@ -28,6 +28,8 @@ pub(crate) struct Soup {
 /// A hybrid model.
 pub(crate) struct Model {
     pub(crate) file: Arc<HybridFile>,
+    /// Number of the first node that has a page.
+    pub(crate) first: u32,
     pub(crate) pages: Vec<Arc<Page>>,
 }
 
@@ -148,51 +150,96 @@ impl Soup {
             borders,
         };
         let record = NodeRecord {
-            level: 0,
-            first_child: 0,
-            children: 0,
             min_steps: min,
             extent_steps: std::array::from_fn(|i| (max[i] - min[i]) as u16),
             error_geo: extra.error_geo,
             error_total: extra.error_geo,
-            cone_axis: [0.0, 0.0, 1.0],
-            cone_sine: 1.0,
             spacing: extra.spacing,
             vertices,
             triangles: page.triangles.len() as u32,
             points: points.len() as u32,
             borders: page.borders.len() as u32,
-            bytes: 0,
-            checksum: 0,
+            ..NOTHING
         };
         (record, page)
     }
 }
 
+/// A node without anything.
+const NOTHING: NodeRecord = NodeRecord {
+    level: 0,
+    first_child: 0,
+    children: 0,
+    min_steps: [0; 3],
+    extent_steps: [0; 3],
+    error_geo: 0.0,
+    error_total: 0.0,
+    cone_axis: [0.0, 0.0, 1.0],
+    cone_sine: 1.0,
+    spacing: 0.0,
+    vertices: 0,
+    triangles: 0,
+    points: 0,
+    borders: 0,
+    bytes: 0,
+    checksum: 0,
+};
+
 impl Model {
-    /// A file in memory of these nodes; its pages are empty, since lists bring them along.
+    /// A file in memory of these nodes, all on one level, below as many without anything as make them a tree; their places count
+    /// steps of that level, which are the grid's. Pages on file are zeros, since lists bring them along.
     pub(crate) fn new(grid: &Grid, has_colors: bool, nodes: Vec<(NodeRecord, Page)>) -> Self {
-        let (records, pages): (Vec<_>, Vec<_>) = nodes.into_iter().unzip();
+        let (leaves, pages): (Vec<_>, Vec<_>) = nodes.into_iter().unzip();
+        let mut widths = vec![leaves.len() as u32];
+        while widths[0] > 1 {
+            widths.insert(0, widths[0].div_ceil(8));
+        }
+        let level = widths.len() as u32 - 1;
+        let largest = leaves.iter().map(|leaf| leaf.error_total).fold(0.0, f32::max);
+        let mut records = Vec::new();
+        for (above, width) in (0..level).zip(&widths) {
+            let below = widths[above as usize + 1];
+            for at in 0..*width {
+                let children = (below - 8 * at).min(8);
+                let first_child = records.len() as u32 - at + width + 8 * at;
+                records.push(NodeRecord { level: above, first_child, children, error_total: largest, ..NOTHING });
+            }
+        }
+        let first = records.len() as u32;
+        let bytes = |leaf: &NodeRecord| leaf.vertices + leaf.triangles + leaf.points;
+        records.extend(leaves.iter().map(|leaf| NodeRecord { level, bytes: bytes(leaf), ..*leaf }));
         let root = Root {
             origin: grid.origin,
             edge: grid.edge,
             bounds: Aabb { min: grid.origin, max: grid.origin + DVec3::splat(grid.edge) },
-            cell_bits: grid.cell_bits,
+            cell_bits: grid.cell_bits - level,
             normal_bits: NORMAL_BITS,
             resolution: 100,
             nodes: records.len() as u64,
-            leaves: records.len() as u64,
-            levels: 1,
+            leaves: leaves.len() as u64,
+            levels: level + 1,
             preserves_appearance: true,
             has_colors,
             closed: false,
             up: UpAxis::Y,
         };
         let skeleton = Skeleton::encode(&root, &records, &gigalod_format::hybrid::Model::default());
-        let writer = Writer::new(Cursor::new(Vec::new()), Kind::Hybrid, skeleton.len() as u64).unwrap();
+        let mut writer = Writer::new(Cursor::new(Vec::new()), Kind::Hybrid, skeleton.len() as u64).unwrap();
+        for record in &records {
+            writer.page(&vec![0; record.bytes as usize]).unwrap();
+        }
         let (bytes, _) = writer.finish(&skeleton, &metadata()).unwrap();
         let container = Container::open(Arc::new(MemoryStore::new(bytes.into_inner()))).unwrap();
-        Self { file: Arc::new(HybridFile::open(container).unwrap()), pages: pages.into_iter().map(Arc::new).collect() }
+        Self {
+            file: Arc::new(HybridFile::open(container).unwrap()),
+            first,
+            pages: pages.into_iter().map(Arc::new).collect(),
+        }
+    }
+
+    /// The record of the node with this page.
+    pub(crate) fn record(&self, at: usize) -> NodeRecord {
+        *self.file.skeleton().record(NodeId(self.first + at as u32))
     }
 
     pub(crate) fn bounds(&self) -> Aabb {
@@ -201,8 +248,11 @@ impl Model {
 
     /// All of it.
     pub(crate) fn draw(&self, file: u32, draws_lines: bool) -> DrawSource {
-        let node =
-            |(at, page): (usize, &Arc<Page>)| HybridNode { node: NodeId(at as u32), page: page.clone(), draws_lines };
+        let node = |(at, page): (usize, &Arc<Page>)| HybridNode {
+            node: NodeId(self.first + at as u32),
+            page: page.clone(),
+            draws_lines,
+        };
         DrawSource::Hybrid(HybridList {
             file: FileId(file),
             hybrid: Some(self.file.clone()),
