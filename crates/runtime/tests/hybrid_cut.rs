@@ -72,7 +72,8 @@ fn judge(octree: &Octree, camera: &Camera, node: NodeId) -> Judged {
     let record = &octree.records[node.0 as usize];
     let (tan, geo) = (camera.tan_half_fov(), f64::from(record.error_geo));
     let below = if record.children > 0 { f64::from(record.error_total) } else { 0.0 };
-    let padded = corners(&octree.root, record, camera, (geo + below).max(f64::from(record.spacing) * 0.5f64.sqrt()));
+    let spacing = f64::from(record.spacing);
+    let padded = corners(&octree.root, record, camera, geo + below + spacing * 0.5f64.sqrt());
     let sides: [fn(DVec3, f64, f64) -> f64; 5] = [
         |at, x, _| at.z * x + at.x,
         |at, x, _| at.z * x - at.x,
@@ -81,7 +82,9 @@ fn judge(octree: &Octree, camera: &Camera, node: NodeId) -> Judged {
         |at, _, _| at.z,
     ];
     let is_outside = sides.iter().any(|side| padded.iter().all(|at| side(*at, tan.x, tan.y) < 0.0));
-    let shown = corners(&octree.root, record, camera, geo);
+    // Of the original, so far around the corners that points cover it.
+    let around = geo + spacing * 0.5;
+    let shown = corners(&octree.root, record, camera, around);
     let depth = shown.iter().map(|at| at.z).fold(f64::INFINITY, f64::min);
     let most = |along: fn(&DVec3) -> f64| shown.iter().map(along).fold(0.0, f64::max);
     let slope = match depth > 0.0 {
@@ -90,8 +93,8 @@ fn judge(octree: &Octree, camera: &Camera, node: NodeId) -> Judged {
     };
     // The nearest point of the box, in the model's axes.
     let step = octree.root.edge / f64::from(1u32 << CELL_BITS) / 2f64.powi(record.level as i32);
-    let min = octree.root.origin + DVec3::from_array(record.min_steps.map(f64::from)) * step - geo;
-    let max = min + DVec3::from_array(record.extent_steps.map(f64::from)) * step + 2.0 * geo;
+    let min = octree.root.origin + DVec3::from_array(record.min_steps.map(f64::from)) * step - around;
+    let max = min + DVec3::from_array(record.extent_steps.map(f64::from)) * step + 2.0 * around;
     let nearest = (camera.eye.clamp(min, max) - camera.eye).length();
     let depth = depth.max(nearest / slope.hypot(1.0));
     let error_px = projected::shift_px(slope, depth, f64::from(record.error_total), camera.focal_px());
@@ -304,15 +307,20 @@ fn of_a_closed_model_what_wholly_shows_its_back_is_left_out_and_nothing_else_cha
 }
 
 #[test]
-fn lines_are_drawn_over_borders_but_not_where_all_neighbours_are_leaves_of_one_level() {
+fn lines_are_drawn_over_borders_but_not_of_leaves_without_anything_finer_beside_them() {
     let octree = Octree::sphere(6, false);
     let mut uneven = all_resident(&octree);
     let report: CutReport = uneven.select(VIEW, &camera(&uneven, (0.0, 1.0)), &Fineness::px(0.5));
     let nodes = drawn(&uneven);
     let borders = |node: &NodeId| u64::from(octree.records[node.0 as usize].borders);
-    assert!(nodes.iter().all(|(node, lines)| *lines == (borders(node) > 0)));
-    assert_eq!(report.lines, nodes.keys().map(borders).sum::<u64>());
+    let record = |node: &NodeId| &octree.records[node.0 as usize];
+    let deepest = nodes.keys().map(|node| record(node).level).max().unwrap();
+    let expected = |node: &NodeId| borders(node) > 0 && (record(node).children > 0 || record(node).level < deepest);
+    assert!(nodes.iter().all(|(node, lines)| *lines == expected(node)));
+    assert_eq!(report.lines, nodes.keys().filter(|node| expected(node)).map(borders).sum::<u64>());
     assert!(report.lines > 0);
+    let leaves_with = nodes.keys().filter(|node| record(node).children == 0).map(expected);
+    assert_eq!(leaves_with.collect::<std::collections::BTreeSet<_>>().len(), 2, "of both kinds");
     // Three levels are even.
     let even = Octree::sphere(3, false);
     assert!(even.records.iter().all(|record| record.children > 0 || record.level == 2));

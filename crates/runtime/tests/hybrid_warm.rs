@@ -15,7 +15,7 @@ use gigalod_runtime::{Fineness, Instance, Interrupt, Residency, Scene, Similarit
 
 #[test]
 fn a_warm_hybrid_frame_allocates_nothing() {
-    let octree = Octree::sphere(8, true);
+    let octree = Octree::sphere(6, true);
     let size = ImageSize { width: 640, height: 480 };
     let looks = [
         (Fineness::px(0.0), u64::MAX),

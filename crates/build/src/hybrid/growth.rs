@@ -35,6 +35,8 @@ pub(super) struct Growth {
     patches: Vec<Patch>,
     pub(super) nodes: Nodes,
     done: u64,
+    /// Pieces that there were, when this process began.
+    total: u64,
     sets: u64,
 }
 
@@ -63,7 +65,7 @@ pub(super) fn fits_into_memory(options: &Options, input: &dyn ModelStream) -> bo
 impl Growth {
     pub(super) fn new(pieces: Spool<Piece>, plan: &MemoryPlan<'_>) -> io::Result<Self> {
         let nodes = Nodes::new(&plan.place())?;
-        Ok(Self { tasks: vec![Task::Set(Cell::ROOT, pieces)], patches: vec![], nodes, done: 0, sets: 0 })
+        Ok(Self { tasks: vec![Task::Set(Cell::ROOT, pieces)], patches: vec![], nodes, done: 0, total: 0, sets: 0 })
     }
 
     /// Does all there is to do. `save` is told now and then how far that has come.
@@ -75,7 +77,8 @@ impl Growth {
         mut save: impl FnMut(&Self) -> io::Result<()>,
     ) -> Result<Nodes, BuildError> {
         let waiting = |task: &Task| if let Task::Set(_, pieces) = task { pieces.len() } else { 0 };
-        let total = self.done + self.tasks.iter().map(waiting).sum::<u64>();
+        self.total = self.done + self.tasks.iter().map(waiting).sum::<u64>();
+        let total = self.total;
         phases.begin("octree", total);
         let at_once = (plan.half() / WORK_PER_PIECE).max(shape.most_triangles as u64);
         let mut unsaved = 0;
@@ -118,10 +121,11 @@ impl Growth {
                 all
             }
         };
-        let told = |done: u64| phases.at(self.done + done);
+        // Cutting has made more of them.
+        let told = |done: u64| phases.at((self.done + done).min(self.total));
         let raised = octree::raise(all, cell, shape, &octree::Told::new(&told));
         self.done += count;
-        phases.at(self.done);
+        phases.at(self.done.min(self.total));
         self.put(raised)
     }
 
@@ -131,16 +135,16 @@ impl Growth {
         Ok(())
     }
 
-    /// Sorts a set into eight; false where something in it is too large for that.
+    /// Sorts a set into eight; false where too much of it is too large for that.
     fn split(&mut self, cell: Cell, pieces: Spool<Piece>, shape: &Shape, plan: &MemoryPlan<'_>) -> io::Result<bool> {
         let mut sets = Vec::new();
         for _ in 0..8 {
             self.sets += 1;
             sets.push(Spool::named(&plan.place_in_files(), &format!("set{}", self.sets))?);
         }
-        let mut fit = true;
+        let (all, mut large) = (pieces.len() as usize, 0);
         pieces.for_each_piece(MemoryPlan::PIECE, |_, piece| {
-            fit &= octree::fit_below(piece, cell, shape);
+            large += piece.iter().filter(|piece| octree::is_large(piece, cell, shape)).count();
             let parts = octree::split(piece, cell, shape);
             sets.iter_mut().zip(&parts).try_for_each(|(set, part)| set.push(part))
         })?;
@@ -149,7 +153,7 @@ impl Growth {
         let tasks: Vec<Task> = sets.map(|(octant, set)| Task::Set(cell.child(octant as u8), set)).collect();
         self.tasks.push(Task::Join(cell, tasks.len()));
         self.tasks.extend(tasks.into_iter().rev());
-        Ok(fit)
+        Ok(octree::may_cut(large, all))
     }
 
     /// Keeps the state in a work folder.
@@ -213,7 +217,7 @@ impl Growth {
             })
         };
         let tasks = tasks.into_iter().map(task).collect::<io::Result<_>>()?;
-        Ok(Self { tasks, patches, nodes: Nodes::reopen(work, &of("list"))?, done, sets })
+        Ok(Self { tasks, patches, nodes: Nodes::reopen(work, &of("list"))?, done, total: 0, sets })
     }
 }
 

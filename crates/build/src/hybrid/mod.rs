@@ -12,11 +12,12 @@
 //! What always holds: each node's error bounds the two-sided distance between its triangles and points and the part of the original that
 //! they stand for; it is at most the edge of the node's cell divided by the resolution. The bytes depend on the input and the options alone.
 //!
-//! Differs from the paper: triangles are not cut at cell faces but belong to the cell that their middle lies in, so that there are no slivers
-//! and leaves meet exactly; a node gathers its children's geometry, not its grandchildren's, with errors that faces carry.
+//! Differs from the paper: triangles belong to the cell that their middle lies in, so that there are no slivers and leaves meet exactly;
+//! only those much larger than a cell are cut at its faces; a node gathers its children's geometry, not its grandchildren's, with errors that faces carry.
 
 mod cell;
 mod cover;
+mod cut;
 mod growth;
 mod looks;
 mod nodes;

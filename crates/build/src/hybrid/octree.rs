@@ -6,6 +6,7 @@
 //! errors, and goes on from there: half the work, and no error is counted that there is not.
 
 use super::cell::Cell;
+use super::cut::cut;
 use super::patch::{Face, Patch, Vertex};
 use super::round::{self, Made};
 use super::simplify::{Limit, simplify};
@@ -23,8 +24,11 @@ pub(super) struct Piece {
     pub(super) at: [[f32; 3]; 3],
     /// Octahedral, 16 bits for each coordinate.
     pub(super) normals: [[u16; 2]; 3],
-    /// Red, green, blue, 0.
-    pub(super) colors: [[u8; 4]; 3],
+    /// Red, green, blue; 0 where there are none.
+    pub(super) colors: [[u8; 3]; 3],
+    /// How often it was cut: each time moves its corners by as much as reading did.
+    pub(super) cuts: u8,
+    pub(super) unused: [u8; 2],
 }
 
 impl Piece {
@@ -60,7 +64,11 @@ impl<'a> Told<'a> {
 
 /// Raises a cell.
 pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape, told: &Told<'_>) -> Raised {
-    if pieces.len() <= shape.most_triangles || cell.level >= shape.deepest() || !fit_below(&pieces, cell, shape) {
+    let may_split = |pieces: &[Piece]| {
+        let large = pieces.iter().filter(|piece| is_large(piece, cell, shape)).count();
+        cell.level < shape.deepest() && may_cut(large, pieces.len())
+    };
+    if pieces.len() <= shape.most_triangles || !may_split(&pieces) {
         told.add(pieces.len());
         return leaf(&pieces, cell, shape);
     }
@@ -75,25 +83,33 @@ pub(super) fn raise(pieces: Vec<Piece>, cell: Cell, shape: &Shape, told: &Told<'
     join(children, cell, shape)
 }
 
-/// False where a triangle is too large for an eighth of the cell: places are counted from there in a few bits. Then nothing is split.
-pub(super) fn fit_below(pieces: &[Piece], cell: Cell, shape: &Shape) -> bool {
+/// True for a triangle that is too large for an eighth of the cell, whose places are counted from there in a few bits.
+pub(super) fn is_large(piece: &Piece, cell: Cell, shape: &Shape) -> bool {
     const MOST_EDGES: f64 = 8.0;
     /// A node's places fit into 16 bits where its triangles are at most so many steps long.
     const MOST_STEPS: f64 = 16_384.0;
     let edges = MOST_EDGES.min(MOST_STEPS / f64::from(1u32 << shape.cell_bits));
     let most = (edges * cell.child(0).edge(shape.edge)) as f32;
-    pieces.iter().all(|piece| {
-        let [a, b, c] = piece.at.map(Vec3::from_array);
-        (a.max(b).max(c) - a.min(b).min(c)).max_element() <= most
-    })
+    let [a, b, c] = piece.at.map(Vec3::from_array);
+    (a.max(b).max(c) - a.min(b).min(c)).max_element() > most
 }
 
-/// Pieces of each eighth, in their order.
+/// False where too many of the pieces would be cut: cutting makes more of them, and splitting is to leave fewer in each cell.
+pub(super) fn may_cut(large: usize, all: usize) -> bool {
+    const LEAST_OTHERS: usize = 15;
+    large * (LEAST_OTHERS + 1) <= all
+}
+
+/// Pieces of each eighth, in their order; those that are too large are cut.
 pub(super) fn split(pieces: &[Piece], cell: Cell, shape: &Shape) -> [Vec<Piece>; 8] {
     let middle = cell.middle(shape.edge);
     let mut sets: [Vec<Piece>; 8] = Default::default();
     for piece in pieces {
-        sets[usize::from(Cell::octant(middle, piece.middle()))].push(*piece);
+        if is_large(piece, cell, shape) {
+            cut(piece, middle, |octant, part| sets[usize::from(octant)].push(part));
+        } else {
+            sets[usize::from(Cell::octant(middle, piece.middle()))].push(*piece);
+        }
     }
     sets
 }

@@ -107,7 +107,9 @@ fn join<C: Corner>(
             Piece {
                 at: corners.map(|corner| (at[corner].exact() - origin).as_vec3().to_array()),
                 normals: corners.map(normal),
-                colors: corners.map(|corner| colors.get(corner).map_or([0; 4], |[r, g, b]| [*r, *g, *b, 255])),
+                colors: corners.map(|corner| colors.get(corner).copied().unwrap_or_default()),
+                cuts: 0,
+                unused: [0; 2],
             }
         };
         let batch: Vec<Piece> = (0..triangles.len()).map(piece).collect();

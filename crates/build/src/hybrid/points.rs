@@ -5,10 +5,12 @@
 //! so small that their corners cover them as well are left to their corners, half as many points as triangles. The patch keeps the
 //! triangles, so the node above may go back to them.
 //!
-//! What always holds: a point's `geo` bounds how far away anything is that it stands for.
+//! What always holds: the `geo` of a point for good bounds how far away anything is that it stands for. Where corners take a face's place,
+//! each is as near to the original as the face was, and each point of the face is within half the node's spacing of one of them, so
+//! squares as wide as the spacing cover it. They are no wider than twice the error: a pixel, where the error is half a pixel.
 //!
 //! Source: the hybrid paper, section 3.2. Differs: it replaces a triangle by up to six points of a grid, which move; corners stay where they
-//! are, are shared, and what they cover is proved.
+//! are and are shared, half as many as triangles.
 
 use super::patch::{Face, Patch, Spot, Vertex, total};
 use super::simplify::up;
@@ -137,20 +139,15 @@ pub(super) struct Small {
 }
 
 impl Small {
-    /// `room` is the largest error that a face may have when it is covered; `moved` how far a vertex is moved by rounding.
-    pub(super) fn of(patch: &Patch, room: f64, moved: impl Fn(u32) -> f64) -> Self {
+    /// `most` is how far from its nearest corner a point of a face may be: half the width that points are drawn with.
+    pub(super) fn of(patch: &Patch, most: f64) -> Self {
         let reach = |face: &Face| {
             let [a, b, c] = face.corners.map(|corner| patch.vertices[corner as usize].at);
             let longest = (a - b).length_squared().max((b - c).length_squared()).max((c - a).length_squared());
             // No point of a triangle is farther from its nearest corner than of a regular one with this edge.
             (longest / 3.0).sqrt()
         };
-        let fits = |face: &Face| {
-            let farthest = face.corners.map(&moved).into_iter().fold(0.0, f64::max);
-            let reach = reach(face);
-            let geo = f64::from(face.geo) + farthest + reach;
-            (geo * geo + f64::from(face.app).powi(2) <= room * room).then_some(reach)
-        };
+        let fits = |face: &Face| Some(reach(face)).filter(|reach| *reach <= most);
         let mut small = Self { reaches: patch.faces.iter().map(fits).collect(), ..Self::default() };
         let mut around = vec![0u32; patch.vertices.len()];
         for (face, _) in patch.faces.iter().zip(&small.reaches).filter(|(_, reach)| reach.is_some()) {

@@ -36,7 +36,7 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     let room = cell.edge(shape.edge) / f64::from(shape.resolution);
     let small = match place {
         Place::Leaf => Small::default(),
-        Place::Above => Small::of(patch, room, moved),
+        Place::Above => Small::of(patch, room),
     };
     let mut errors = Errors::default();
     let mut cone = Cone::default();
@@ -46,12 +46,11 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     for (number, face) in patch.faces.iter().enumerate() {
         let corners = face.corners.map(|corner| steps[corner as usize]);
         let geo = f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max);
-        if let Some(Some(reach)) = small.reaches.get(number) {
-            errors.add(up(geo + reach), face.app);
+        errors.add(up(geo), face.app);
+        if let Some(Some(_)) = small.reaches.get(number) {
             cone.add(corners);
             continue;
         }
-        errors.add(up(geo), face.app);
         let [a, b, c] = corners;
         if a == b || b == c || c == a {
             flattened.push((corners, face));

@@ -2,6 +2,7 @@
 
 use super::octree::Piece;
 use super::patch::{Face, Patch, Vertex};
+use super::simplify::up;
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -42,7 +43,7 @@ impl Hasher for PlaceHasher {
     }
 }
 
-/// A patch of triangles as they were read, but for `rounding`.
+/// A patch of triangles as they were read, but for `rounding`, once and for each cut.
 pub(super) fn patch_of(pieces: &[Piece], rounding: f32) -> Patch {
     let mut patch = Patch {
         vertices: Vec::with_capacity(pieces.len() / 2),
@@ -55,17 +56,20 @@ pub(super) fn patch_of(pieces: &[Piece], rounding: f32) -> Patch {
         for (side, corner) in corners.iter_mut().enumerate() {
             let (at, normal, color) = (piece.at[side], piece.normals[side], piece.colors[side]);
             let [x, y, z] = at.map(f32::to_bits);
-            let key = [x, y, z, u32::from(normal[0]) | u32::from(normal[1]) << 16, u32::from_le_bytes(color)];
+            let [red, green, blue] = color;
+            let look = [u32::from(normal[0]) | u32::from(normal[1]) << 16, u32::from_le_bytes([red, green, blue, 0])];
+            let key = [x, y, z, look[0], look[1]];
             *corner = *known.entry(key).or_insert_with(|| {
                 patch.vertices.push(Vertex {
                     at: Vec3::from_array(at).as_dvec3(),
                     normal: normal_of(normal),
-                    color: Vec3::from_array([color[0], color[1], color[2]].map(f32::from)),
+                    color: Vec3::from_array(color.map(f32::from)),
                 });
                 patch.vertices.len() as u32 - 1
             });
         }
-        patch.faces.push(Face { corners, geo: rounding, app: 0.0 });
+        let geo = up(f64::from(rounding) * (1.0 + f64::from(piece.cuts)));
+        patch.faces.push(Face { corners, geo, app: 0.0 });
     }
     patch
 }
@@ -108,7 +112,7 @@ pub(super) fn gather(patches: Vec<Patch>) -> Patch {
 }
 
 /// Direction of a code of 16 bits for each coordinate.
-fn normal_of(code: [u16; 2]) -> Vec3 {
+pub(super) fn normal_of(code: [u16; 2]) -> Vec3 {
     let at = Vec2::from_array(code.map(|value| f32::from(value) / 32_767.5 - 1.0));
     let z = 1.0 - at.x.abs() - at.y.abs();
     let fold = (-z).max(0.0);

@@ -96,13 +96,19 @@ fn nodes_of(records: &[NodeRecord], error: f64) -> Vec<NodeId> {
         if !open[number] {
             continue;
         }
-        if record.children == 0 || f64::from(record.error_geo) <= error {
+        if record.children == 0 || exported_error(record) <= error {
             nodes.push(NodeId(number as u32));
         } else {
             open[record.first_child as usize..(record.first_child + record.children) as usize].fill(true);
         }
     }
     nodes
+}
+
+/// Points have no size any more: what was within half a spacing of one is so far away.
+fn exported_error(record: &NodeRecord) -> f64 {
+    let bare = if record.points > 0 { 0.5 * f64::from(record.spacing) } else { 0.0 };
+    f64::from(record.error_geo) + bare
 }
 
 /// Nodes that are exported.

@@ -124,7 +124,7 @@ impl<'a> Seen<'a> {
             borders_at: 0,
             spacing: (f64::from(record.spacing) * self.placement.scale) as f32,
             right: axis(camera.right),
-            half_width: (f64::from(record.error_geo) * self.placement.scale) as f32,
+            half_width: (line_half_width(record) * self.placement.scale) as f32,
             up: axis(camera.up),
             vertices: record.vertices,
             forward: axis(camera.forward),
@@ -150,7 +150,7 @@ impl<'a> Seen<'a> {
         let [low, extent] = self.bounds(record);
         let camera = &self.view.camera;
         // Points and lines stick out.
-        let margin = f64::from(record.spacing) + f64::from(record.error_geo);
+        let margin = f64::from(record.spacing) + line_half_width(record);
         let mut window = [DVec2::INFINITY, DVec2::NEG_INFINITY];
         for corner in 0..8u32 {
             let part = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
@@ -166,17 +166,13 @@ impl<'a> Seen<'a> {
         // Points are a pixel wide, and places are rounded.
         [window[0] - 2.0, window[1] + 2.0]
     }
+}
 
-    /// Half the largest width in pixels of lines of a node.
-    pub(crate) fn line_half_px(&self, record: &NodeRecord) -> f64 {
-        let [low, extent] = self.bounds(record);
-        let camera = &self.view.camera;
-        // Depth of the box's nearest corner.
-        let forward = camera.forward;
-        let depth = (low - camera.eye).dot(forward) + (extent * forward.min(DVec3::ZERO)).element_sum();
-        let error = f64::from(record.error_geo);
-        if depth > error { camera.focal_px() * error / depth } else { f64::INFINITY }
-    }
+/// Half the width of a node's lines, model units. Each side of a gap covers what its own error opens; leaves of a finer level or of
+/// the same, which draw no lines, are rounded to a smaller grid, and that is covered from here.
+fn line_half_width(record: &NodeRecord) -> f64 {
+    let beside = if record.children == 0 { 1.5 } else { 1.0625 };
+    f64::from(record.error_geo) * beside
 }
 
 #[cfg(test)]

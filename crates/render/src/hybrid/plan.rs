@@ -32,9 +32,6 @@ pub(crate) type RunParams = [u32; 2];
 /// Runs that primitives' numbers can name.
 const MOST_RUNS: u64 = 1 << (32 - RUN_LOG2);
 
-/// Lines thinner than this are left out, half their width in pixels; `LEAST_HALF_PX` of hybrid_spots.wgsl.
-const LEAST_HALF_PX: f64 = 0.03;
-
 /// What is drawn in one go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Slice {
@@ -92,11 +89,10 @@ impl Plan {
                 if page.positions.len() > MOST_VERTICES {
                     return Err(RenderError::TooMany(page.positions.len() as u64));
                 }
-                let has_lines = node.draws_lines && seen.line_half_px(record) >= LEAST_HALF_PX;
                 let counts = [
                     page.triangles.len() as u32,
                     points(page, record.vertices),
-                    if has_lines { page.borders.len() as u32 } else { 0 },
+                    if node.draws_lines { page.borders.len() as u32 } else { 0 },
                 ];
                 for (runs, count) in by_kind.iter_mut().zip(counts) {
                     for first in (0..count).step_by(1 << RUN_LOG2) {

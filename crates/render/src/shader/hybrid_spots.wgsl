@@ -3,11 +3,9 @@
 // A point is a square around where it is, as wide as the node's points are apart, at least a pixel: so it covers a pixel's centre
 // exactly where squares of neighbours do not. Its depth is its own.
 //
-// A line is what lies near a border edge: half as wide as the node's error at each end, so that it covers whatever gap may be there.
+// A line is what lies near a border edge: as far as its node's error (and a bit, for neighbours' rounding), so that it covers whatever gap may be there.
 // It lies a little behind the edge, so that it does not show in front of surfaces that recede, and by less than the node's error.
 
-// Half widths below this close nothing that could be seen, in pixels.
-const LEAST_HALF_PX: f32 = 0.03;
 // Vertices are rounded by up to this on the screen, in pixels.
 const ROUNDING_PX: f32 = 0.003;
 // How far behind its edge a line lies, in half widths.
@@ -75,9 +73,6 @@ fn line_of(node: Node, ends: vec2u) -> Spot {
     out.a = px_of(a, per_z.x);
     out.b = px_of(b, per_z.y);
     out.half_px = per_z * (node.half_width * frame.focal_px);
-    if max(out.half_px.x, out.half_px.y) < LEAST_HALF_PX {
-        return out;
-    }
     out.half_px += ROUNDING_PX;
     let behind = BEHIND * node.half_width;
     out.per_z = vec2f(1.0 / (a.z + behind), 1.0 / (b.z + behind));

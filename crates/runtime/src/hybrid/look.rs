@@ -93,13 +93,14 @@ impl<'a> Look<'a> {
         let [geo, total] = [record.error_geo, record.error_total].map(|error| f64::from(error).max(0.0));
         // What is below lies around the original, within an error that is not larger.
         let below = if record.children > 0 { total } else { 0.0 };
-        let reach = half + (geo + below).max(f64::from(record.spacing) * POINT_REACH);
+        let reach = half + geo + below + f64::from(record.spacing).max(0.0) * POINT_REACH;
         let is_outside = |inward: &DVec3| inward.dot(center) + inward.abs().dot(reach) < 0.0;
         if self.frustum_culling && self.planes.iter().any(is_outside) {
             return None;
         }
         // Whatever does not compare is as bad as can be.
-        let error_px = self.error_px(center, half + geo, f64::from(record.error_total)) as f32;
+        let shown = half + geo + f64::from(record.spacing).max(0.0) * 0.5;
+        let error_px = self.error_px(center, shown, f64::from(record.error_total)) as f32;
         Some(Sight { node, error_px: if error_px.is_nan() { f32::INFINITY } else { error_px } })
     }
 

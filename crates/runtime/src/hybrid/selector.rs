@@ -52,9 +52,8 @@ struct Walk<'a> {
     requests: &'a mut Vec<PageRequest>,
     report: CutReport,
     room_bytes: u64,
-    /// Level of the leaves that are drawn, as long as nothing else is.
-    alike: Option<u32>,
-    all_alike: bool,
+    /// Finest level of what is drawn.
+    deepest: u32,
 }
 
 impl Selector for HybridSelector {
@@ -78,8 +77,7 @@ impl Selector for HybridSelector {
                 requests: &mut out.requests,
                 report: out.report,
                 room_bytes: input.room_bytes,
-                alike: None,
-                all_alike: true,
+                deepest: 0,
             };
             outcome = match walk.run(&mut self.stack) {
                 Ok(()) => Outcome::Complete,
@@ -243,7 +241,7 @@ impl Walk<'_> {
         if self.list.nodes.len() == self.list.nodes.capacity() && !self.grow(self.list.nodes.len().max(64)) {
             return Err(Outcome::NoRoom);
         }
-        self.all_alike &= record.children == 0 && *self.alike.get_or_insert(record.level) == record.level;
+        self.deepest = self.deepest.max(record.level);
         self.list.nodes.push(HybridNode { node, page, draws_lines: record.borders > 0 });
         Ok(())
     }
@@ -258,11 +256,13 @@ impl Walk<'_> {
 
     fn finish(&mut self) {
         self.list.nodes.sort_unstable_by_key(|node| node.node);
-        if self.all_alike {
-            // Leaves of one level share what lies on their borders, so there are no gaps.
-            self.list.nodes.iter_mut().for_each(|node| node.draws_lines = false);
+        // Leaves of one level share what lies on their borders, and neighbours that are simplified cover gaps as wide as leaves of
+        // their own level or a finer one are rounded. So a leaf only draws lines where something finer may lie beside it.
+        let (skeleton, deepest) = (self.file.skeleton(), self.deepest);
+        for node in &mut self.list.nodes {
+            let record = skeleton.record(node.node);
+            node.draws_lines &= record.children > 0 || record.level < deepest;
         }
-        let skeleton = self.file.skeleton();
         let with_lines = self.list.nodes.iter().filter(|node| node.draws_lines);
         self.report.lines = with_lines.map(|node| u64::from(skeleton.record(node.node).borders)).sum();
         // So that a list that grows a little needs no memory.

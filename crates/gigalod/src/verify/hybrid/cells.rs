@@ -68,8 +68,22 @@ impl<'a> Cells<'a> {
     pub(super) fn node(&self, corners: [DVec3; 3], level: Option<u32>) -> Option<NodeId> {
         // As builders see it: relative to the origin, in single precision.
         let (middle, _) = ball(corners.map(|corner| (corner - self.origin).as_vec3().as_dvec3()));
+        self.known(middle, level)
+    }
+
+    /// The node of a level, or the leaf above, whose cell a place lies in, as [`Self::node`].
+    pub(super) fn node_at(&self, at: DVec3, level: Option<u32>) -> Option<NodeId> {
+        self.known(at - self.origin, level)
+    }
+
+    /// Edge of a node's cell.
+    pub(super) fn edge(&self, node: NodeId) -> f64 {
+        self.edge / 2f64.powi(self.records[node.0 as usize].level as i32)
+    }
+
+    fn known(&self, local: DVec3, level: Option<u32>) -> Option<NodeId> {
         let finest = level.unwrap_or(self.finest);
-        let known = (0..=finest).rev().find_map(|level| self.nodes.get(&self.cell(middle, level)).copied())?;
+        let known = (0..=finest).rev().find_map(|level| self.nodes.get(&self.cell(local, level)).copied())?;
         let record = &self.records[known.0 as usize];
         (record.children == 0 || Some(record.level) == level).then_some(known)
     }

@@ -49,6 +49,10 @@ fn add(found: &mut Found, corners: [DVec3; 3], (pass, near): (&Pass, &Near<'_>),
     // Where nothing is drawn at all, whoever is first answers for it.
     let (distance, nearest) = near.nearest(middle).unwrap_or_else(|| nothing(pass));
     let node = cells.node(corners, pass.level).unwrap_or(nearest);
+    // A triangle so large may have been cut: then whoever's cell a part lies in stands for it.
+    if radius > cells.edge(node) / 2.0 {
+        return add_large(found, corners, node, (pass, near), cells, tally);
+    }
     let record = tally.record(node);
     let is_leaf = record.children == 0;
     if is_leaf != pass.level.is_none() {
@@ -65,6 +69,31 @@ fn add(found: &mut Found, corners: [DVec3; 3], (pass, near): (&Pass, &Near<'_>),
         let at = point(corners, weights);
         let (distance, _) = near.nearest(at).unwrap_or_else(|| nothing(pass));
         found.add(tally, node, Way::Forward, at, distance, weight * share);
+    }
+}
+
+/// Holds each part against the larger error of two nodes: that with the triangle's middle in its cell, and that with the part.
+fn add_large(
+    found: &mut Found,
+    corners: [DVec3; 3],
+    whole: NodeId,
+    (pass, near): (&Pass, &Near<'_>),
+    cells: &Cells<'_>,
+    tally: &Tally<'_>,
+) {
+    let is_leaf = pass.level.is_none();
+    let is_measured = |node: &NodeId| (tally.record(*node).children == 0) == is_leaf;
+    let error = |node: &NodeId| tally.record(*node).error_geo;
+    let parts = if is_leaf { LEAST_PARTS } else { parts(corners, f64::from(error(&whole))) };
+    let weight = if is_leaf { area(corners) } else { 0.0 };
+    for (weights, share) in grid(parts) {
+        let at = point(corners, weights);
+        let (distance, nearest) = near.nearest(at).unwrap_or_else(|| nothing(pass));
+        let part = cells.node_at(at, pass.level).unwrap_or(nearest);
+        let larger = [part, whole].into_iter().filter(is_measured).max_by(|a, b| error(a).total_cmp(&error(b)));
+        if let Some(node) = larger {
+            found.add(tally, node, Way::Forward, at, distance, weight * share);
+        }
     }
 }
 
