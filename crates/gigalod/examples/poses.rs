@@ -11,7 +11,7 @@
 mod common;
 
 use anyhow::{Context, Result, bail};
-use common::{draw, mesh, open, scene};
+use common::{draw, mesh, open_any, scene};
 use gigalod::geom::ImageSize;
 use gigalod::render::{Gpu, Kernel, Renderer};
 use gigalod::runtime::splats::MATERIAL_SRGB;
@@ -43,7 +43,7 @@ fn main() -> Result<()> {
     let count = rest.first().map_or(Ok(50), |text| text.parse()).context("POSES")?;
     let mesh = mesh(Path::new(model));
     let bvh = Bvh::build(&mesh);
-    let mut scene = scene(open(Path::new(built)));
+    let mut scene = scene(open_any(Path::new(built)));
     let mut renderer = Renderer::new(Gpu::open()?)?;
     let mut figures: [Figures; KERNELS.len()] = Default::default();
     for index in 0..count {

@@ -114,10 +114,38 @@ pub(super) fn split(pieces: &[Piece], cell: Cell, shape: &Shape) -> [Vec<Piece>;
     sets
 }
 
+/// The leaf of a cell. Where triangles are large, the grid of the cell's level is coarse beside what is finer elsewhere, and so is the
+/// root's for anything: then the leaf lies deeper, as far as its places fit into a node, below nodes with one child each.
 fn leaf(pieces: &[Piece], cell: Cell, shape: &Shape) -> Raised {
+    let mut path = vec![cell];
+    for _ in 0..levels_deeper(pieces, cell, shape) {
+        let above = path[path.len() - 1];
+        path.push(above.child(Cell::octant(above.middle(shape.edge), pieces[0].middle())));
+    }
     let patch = weld::patch_of(pieces, shape.rounding());
-    let made = round::round(&patch, cell, shape, round::Place::Leaf);
-    Raised { patch, nodes: vec![made] }
+    let made = round::round(&patch, path[path.len() - 1], shape, round::Place::Leaf);
+    let deepest = Raised { patch, nodes: vec![made] };
+    path.iter().rev().skip(1).fold(deepest, |raised, above| join(vec![raised], *above, shape))
+}
+
+fn levels_deeper(pieces: &[Piece], cell: Cell, shape: &Shape) -> u32 {
+    /// Parts of the edge of a cell.
+    const LARGE: f64 = 0.5;
+    /// A node has room for 2^16 steps; some are for what rounding puts aside.
+    const MOST_STEPS: f64 = 65_000.0;
+    let box_of = |corners: &[[f32; 3]]| {
+        let at = || corners.iter().map(|at| Vec3::from_array(*at));
+        (at().fold(Vec3::INFINITY, Vec3::min), at().fold(Vec3::NEG_INFINITY, Vec3::max))
+    };
+    let extent = |(low, high): (Vec3, Vec3)| f64::from((high - low).max_element());
+    let largest = pieces.iter().map(|piece| extent(box_of(&piece.at))).fold(0.0, f64::max);
+    if largest <= LARGE * cell.edge(shape.edge) && cell != Cell::ROOT {
+        return 0;
+    }
+    let boxes = pieces.iter().map(|piece| box_of(&piece.at));
+    let all = boxes.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |all, one| (all.0.min(one.0), all.1.max(one.1)));
+    let deeper = (MOST_STEPS * shape.step(cell.level) / extent(all)).log2().floor().max(0.0) as u32;
+    deeper.min(shape.deepest().saturating_sub(cell.level))
 }
 
 /// The node of a cell whose children are done.

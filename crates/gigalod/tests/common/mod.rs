@@ -1,14 +1,14 @@
 //! What picture tests share: real models, builds in a temporary folder, drawing.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
-use gigalod::build::{NoProgress, Options, splats};
+use gigalod::build::{NoProgress, Options, hybrid, splats};
 use gigalod::format::splats::SplatFile;
 use gigalod::format::{Container, FileStore};
 use gigalod::geom::{Camera, ImageSize};
 use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Kernel, Look, Picture, Renderer};
 use gigalod::runtime::residency::InlineLoader;
-use gigalod::runtime::{CutReport, Fineness, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::runtime::{CutReport, Fineness, Instance, ModelFile, Residency, Scene, Similarity, ViewId};
 use gigalod::verify;
 use gigalod_reference::Mesh;
 use std::fs::File;
@@ -58,8 +58,21 @@ pub(crate) fn open(path: &Path) -> Arc<SplatFile> {
     Arc::new(SplatFile::open(container).unwrap())
 }
 
+/// Builds `model` as triangles and points into `folder`; opens the result.
+pub(crate) fn built_hybrid(model: &Path, folder: &Path) -> ModelFile {
+    let out = folder.join("model.glod");
+    let stream = gigalod::import::open(Box::new(File::open(model).unwrap())).unwrap();
+    hybrid::build(stream, &Options::default(), &NoProgress, &out).unwrap();
+    open_any(&out)
+}
+
+/// Opens a `.glod` file of any kind.
+pub(crate) fn open_any(path: &Path) -> ModelFile {
+    ModelFile::open(Container::open(Arc::new(FileStore::open(path).unwrap())).unwrap()).unwrap()
+}
+
 /// A scene of one model where its file has it.
-pub(crate) fn scene(file: Arc<SplatFile>) -> Scene {
+pub(crate) fn scene(file: impl Into<ModelFile>) -> Scene {
     let mut residency = Residency::new(1 << 30, Box::new(InlineLoader::default()));
     let file = residency.add(file);
     let mut scene = Scene::new(residency);
