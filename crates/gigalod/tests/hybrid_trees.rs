@@ -219,6 +219,25 @@ fn any_mesh_is_built_the_same_with_any_memory() {
     }
 }
 
+/// What is much larger than the cells around it is cut, or nothing around it could be split.
+#[test]
+fn a_ground_below_a_scan_does_not_keep_it_together() {
+    let corners = [[-9e3, -8e3], [9e3, -7e3], [8e3, 9e3], [-8e3, 8e3]];
+    let ground =
+        Mesh { vertices: corners.iter().map(|[x, y]| [*x, *y, 0.7]).collect(), triangles: vec![[0, 1, 2], [0, 2, 3]] };
+    let obj = Mesh::grid(300, bumps).plus(&ground).obj();
+    let options = Options { keeps_looks: false, threads: 2, ..Options::default() };
+    let bytes = built(&obj, &options).unwrap();
+    let small = Options { memory_bytes: 64 * MIB, threads: 1, ..options };
+    assert!(built(&obj, &small).unwrap() == bytes);
+    let store = gigalod::format::MemoryStore::new(bytes);
+    let file = HybridFile::open(Container::open(Arc::new(store)).unwrap()).unwrap();
+    let leaves = || file.skeleton().nodes().iter().filter(|node| node.children == 0);
+    assert!(leaves().all(|leaf| leaf.triangles <= 4096), "{:?}", leaves().map(|leaf| leaf.triangles).max());
+    let count: u32 = leaves().map(|leaf| leaf.triangles).sum();
+    assert!((180_002..180_500).contains(&count), "{count}");
+}
+
 #[test]
 fn what_is_no_mesh_is_refused() {
     let points = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\

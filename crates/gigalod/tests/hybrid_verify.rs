@@ -39,6 +39,35 @@ fn no_node_of_a_real_scan_is_beyond_its_error() {
     }
 }
 
+/// Its ground is cut, and its parts lie deeper than they would have to.
+#[test]
+fn nor_one_of_a_statue_on_a_large_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, mesh) = statue(folder.path());
+    let bounds = mesh.bounds();
+    let mut obj = String::new();
+    let mut vertex = |at: [f64; 3]| obj.push_str(&format!("v {} {} {}\n", at[0], at[1], at[2]));
+    mesh.positions().iter().for_each(|at| vertex(at.to_array()));
+    let (middle, reach, first) = (bounds.center(), 20.0 * bounds.diagonal(), mesh.positions().len() + 1);
+    for [x, z] in [[-1.0, -1.0], [0.9, -1.0], [1.0, 1.0], [-1.0, 0.8]] {
+        vertex([middle.x + x * reach, bounds.min.y + 0.01 * x, middle.z + z * reach]);
+    }
+    let faces = mesh.triangles().iter().map(|corners| corners.map(|corner| corner as usize + 1));
+    for [a, b, c] in faces.chain([[first, first + 2, first + 1], [first, first + 3, first + 2]]) {
+        obj.push_str(&format!("f {a} {b} {c}\n"));
+    }
+    let path = folder.path().join("on_ground.obj");
+    std::fs::write(&path, obj).unwrap();
+    let options = Options { most_triangles: Some(512), ..Options::default() };
+    let (file, mesh) = built(&path, &options, folder.path());
+    assert_eq!(check(&file, &mut |_| {}).1.told, [""; 0]);
+    let measured = against(&file, &mesh, &|_| {}).unwrap();
+    assert_eq!(measured.violations, []);
+    let leaves = || file.skeleton().nodes().iter().filter(|node| node.children == 0);
+    let most = leaves().map(|leaf| leaf.error_geo).fold(0.0, f32::max);
+    assert!(f64::from(most) < 2e-5 * mesh.bounds().diagonal(), "{most}: the ground is where it was");
+}
+
 #[test]
 fn a_vertex_that_is_moved_beyond_the_error_is_found() {
     let folder = tempfile::tempdir().unwrap();
