@@ -58,10 +58,10 @@ const SHOTS: [Shot; 4] = [
     },
     Shot {
         file: "4-levels.png",
-        shows: "levels of detail, a colour each, --error 6",
-        at: DVec3::new(0.0, 0.25, 0.2),
-        orbit: [25.0, 20.0, 1.6],
-        threshold_px: 6.0,
+        shows: "from above, levels of detail, a colour each, --error 3",
+        at: DVec3::ZERO,
+        orbit: [32.0, 52.0, 2.0],
+        threshold_px: 3.0,
         tint: Tint::Level,
     },
 ];
