@@ -11,7 +11,7 @@
 use glam::DVec3;
 
 /// How often a triangle is cut.
-const MOST_CUTS: u32 = 3;
+const MOST_CUTS: u32 = 2;
 /// More than all roundings of this file, as a share.
 const ROUNDING: f64 = 1e-6;
 

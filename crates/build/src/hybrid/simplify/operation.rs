@@ -11,7 +11,7 @@ use super::{Operation, Work, up};
 use glam::DVec3;
 
 /// Edges longer than so many times the limit are not tried where nothing can be laid flat.
-const COVERED_LENGTH: f64 = 3.0;
+const COVERED_LENGTH: f64 = 0.7;
 /// Faces around both ends of an edge that are covered at most.
 const MOST_COVERED: usize = 48;
 
