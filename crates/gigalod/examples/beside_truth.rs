@@ -1,9 +1,9 @@
 //! Draws a model beside what a ray tracer sees of it, and their difference.
 //!
-//! `cargo run --release --example beside_truth -- MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid]]]`
+//! `cargo run --release --example beside_truth -- MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid|geometry]]]`
 //!
-//! Left: as it is drawn. Middle: the ray tracer. Right: their difference, four times enlarged; holes red, steep places drawn a
-//! little to the side blue, fat green. Prints the judge's counts and the image metrics.
+//! `geometry` is a hybrid without appearance. Left: as it is drawn. Middle: the ray tracer. Right: their difference, four times
+//! enlarged; holes red, steep places drawn a little to the side blue, fat green. Prints the judge's counts and the image metrics.
 
 use anyhow::{Context, Result};
 use gigalod::build::{NoProgress, Options, hybrid, splats};
@@ -27,7 +27,7 @@ const SIZE: ImageSize = ImageSize { width: 800, height: 600 };
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, out, rest @ ..] = &arguments[..] else {
-        anyhow::bail!("usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid]]]");
+        anyhow::bail!("usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid|geometry]]]");
     };
     let number = |at: usize, default: f64| rest.get(at).map_or(Ok(default), |text: &String| text.parse::<f64>());
     let (orbit_deg, zoom, threshold_px) = ([number(0, 0.0)?, number(1, 0.0)?], number(2, 1.0)?, number(3, 1.0)?);
@@ -36,8 +36,10 @@ fn main() -> Result<()> {
     let folder = tempfile::tempdir()?;
     let built = folder.path().join("model.glod");
     let stream = gigalod::import::open(Box::new(File::open(model)?))?;
-    let builder = if rest.get(4).is_some_and(|kind| kind == "hybrid") { hybrid::build } else { splats::build };
-    builder(stream, &Options::default(), &NoProgress, &built)?;
+    let kind = rest.get(4).map_or("splats", String::as_str);
+    let options = Options { keeps_looks: kind != "geometry", ..Options::default() };
+    let builder = if kind == "splats" { splats::build } else { hybrid::build };
+    builder(stream, &options, &NoProgress, &built)?;
     let file = ModelFile::open(Container::open(Arc::new(FileStore::open(&built)?))?)?;
     let up = file.up();
     let mut residency = Residency::new(4 << 30, Box::new(InlineLoader::default()));

@@ -1,21 +1,20 @@
 //! How much each kernel shimmers while a camera moves slowly, beside a picture filtered as it should be.
 //!
-//! `cargo run --release --example shimmer -- MODEL.ply [ERROR_PX]`
+//! `cargo run --release --example shimmer -- MODEL.ply [ERROR_PX [splats|hybrid|geometry]]`
 //!
 //! The camera moves by a tenth of a pixel a frame, to the right and forwards. Prints one JSON object: for each kernel its
 //! shimmer and its sharpness as multiples of those of a ray tracer with 16 rays a pixel, and the holes of its first frame.
-//! A kernel with less shimmer than that at less sharpness only blurs.
+//! A kernel with less shimmer than that at less sharpness only blurs. Hybrid models have one; `geometry` is without appearance.
 
 use anyhow::{Context, Result};
-use gigalod::build::{NoProgress, Options, splats};
-use gigalod::format::splats::SplatFile;
+use gigalod::build::{NoProgress, Options, hybrid, splats};
 use gigalod::format::{Container, FileStore};
 use gigalod::geom::{Camera, ImageSize};
 use gigalod::import::read_all;
 use gigalod::render::{Frame, Gpu, Kernel, Lighting, Look, Renderer};
 use gigalod::runtime::residency::InlineLoader;
 use gigalod::runtime::splats::MATERIAL_SRGB;
-use gigalod::runtime::{Fineness, Instance, Residency, Scene, Similarity, ViewId};
+use gigalod::runtime::{Fineness, Instance, ModelFile, Residency, Scene, Similarity, ViewId};
 use gigalod::verify;
 use gigalod_reference::judge::{Drawn, judge};
 use gigalod_reference::raytrace::{supersampled_coverage, supersampled_picture};
@@ -31,11 +30,12 @@ const STEP_PX: f64 = 0.1;
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, rest @ ..] = &arguments[..] else {
-        anyhow::bail!("usage: shimmer MODEL.ply [ERROR_PX]");
+        anyhow::bail!("usage: shimmer MODEL.ply [ERROR_PX [splats|hybrid|geometry]]");
     };
     let threshold_px: f32 = rest.first().map_or(Ok(1.0), |text| text.parse())?;
     let mesh = read(Path::new(model))?;
-    let mut scene = open(Path::new(model))?;
+    let kind = rest.get(1).map_or("splats", String::as_str);
+    let mut scene = open(Path::new(model), kind)?;
     let mut renderer = Renderer::new(Gpu::open()?)?;
 
     let cameras: Vec<Camera> = (0..FRAMES).map(|frame| dolly(&mesh, f64::from(frame))).collect();
@@ -48,7 +48,8 @@ fn main() -> Result<()> {
     let (shimmer, sharpness) = (temporal::shimmer(&filtered, &mask), temporal::sharpness(&filtered[0], &mask));
 
     let mut kernels = serde_json::Map::new();
-    for kernel in Kernel::ALL {
+    let used = if kind == "splats" { &Kernel::ALL[..] } else { &[Kernel::Round] };
+    for kernel in used.iter().copied() {
         let mut first = None;
         let pictures = cameras
             .iter()
@@ -70,6 +71,7 @@ fn main() -> Result<()> {
         let figures = serde_json::json!({
             "shimmer": temporal::shimmer(&pictures, &mask) / shimmer,
             "sharpness": temporal::sharpness(&pictures[0], &mask) / sharpness,
+            "primitives": report.primitives(),
             "holes": verdict.holes.len(),
             "fat": verdict.fat.len(),
             "psnr_db": metrics::psnr_db(&filtered[0], &pictures[0], Some(&mask)),
@@ -113,13 +115,15 @@ fn shading(camera: &Camera) -> Shading {
     }
 }
 
-fn open(model: &Path) -> Result<Scene> {
+fn open(model: &Path, kind: &str) -> Result<Scene> {
     let folder = tempfile::tempdir()?;
     let built = folder.path().join("model.glod");
     let stream = gigalod::import::open(Box::new(File::open(model)?))?;
-    splats::build(stream, &Options::default(), &NoProgress, &built)?;
+    let options = Options { keeps_looks: kind != "geometry", ..Options::default() };
+    let builder = if kind == "splats" { splats::build } else { hybrid::build };
+    builder(stream, &options, &NoProgress, &built)?;
     let mut residency = Residency::new(4 << 30, Box::new(InlineLoader::default()));
-    let id = residency.add(Arc::new(SplatFile::open(Container::open(Arc::new(FileStore::open(&built)?))?)?));
+    let id = residency.add(ModelFile::open(Container::open(Arc::new(FileStore::open(&built)?))?)?);
     let mut scene = Scene::new(residency);
     scene.add(Instance { file: id, placement: Similarity::IDENTITY });
     Ok(scene)

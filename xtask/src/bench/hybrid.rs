@@ -43,13 +43,13 @@ fn build(bench: &Bench, model: &str, out: &str, appearance: &str, threads: &str)
 
 fn built(bench: &Bench, (name, model, is_measured): &Model, rows: &mut Vec<Row>) -> Result<()> {
     // Bytes of normals are in both: a file without appearance keeps them for shading.
-    for (appearance, least, most_bytes) in [("on", 0.06, 4.5), ("off", 0.10, 2.5)] {
+    for (appearance, least, most_bytes) in [("on", 60.0, 4.5), ("off", 100.0, 2.5)] {
         let one = build(bench, model, "hybrid.glod", appearance, "1")?;
         let two = build(bench, model, "hybrid.glod", appearance, "2")?;
         let triangles = number(&one["input"], "triangles");
-        let rate = triangles / number(&one, "cpu_seconds") / 1e6;
+        let rate = triangles / number(&one, "cpu_seconds") / 1e3;
         let figure = format!("{name}, appearance {appearance}");
-        rows.push(at_least(format!("build, {figure}"), rate, least, "M triangles a CPU-second"));
+        rows.push(at_least(format!("build, {figure}"), rate, least, "k triangles a CPU-second"));
         let ratio = number(&two, "seconds") / number(&one, "seconds");
         rows.push(at_most(format!("two threads' wall time to one's, {figure}"), ratio, 0.65, ""));
         let bytes = number(&one, "output_bytes") / triangles;
@@ -76,8 +76,8 @@ fn large(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
     let triangles = number(&run["input"], "triangles");
     let peak = number(&run, "peak_memory_bytes") / f64::from(1 << 20);
     rows.push(at_most("peak anonymous memory, 100 M triangles, --memory 1GiB".into(), peak, 1152.0, "MiB"));
-    let rate = triangles / number(&run, "cpu_seconds") / 1e6;
-    rows.push(at_least("build, statue, 100 M".into(), rate, 0.06, "M triangles a CPU-second"));
+    let rate = triangles / number(&run, "cpu_seconds") / 1e3;
+    rows.push(at_least("build, statue, 100 M".into(), rate, 60.0, "k triangles a CPU-second"));
     let bytes = number(&run, "output_bytes") / triangles;
     rows.push(at_most("file, statue, 100 M".into(), bytes, 4.5, "bytes a triangle"));
     Ok(())
@@ -89,9 +89,9 @@ fn quality(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Resul
     bench.0.gigalod(&["build", model, "-o", out, "--as", "hybrid", "--appearance", "off", "--tmax", "1024"])?;
     let lines = bench.lines("gigalod", "hybrid_levels", &[out, model])?;
     let last: Value = serde_json::from_str(lines.last().context("no line")?)?;
-    for (share, key, most) in [("1/8", "rms_at_1_8", 6.5e-5), ("1/64", "rms_at_1_64", 4.0e-4)] {
+    for (share, key, most) in [("1/8", "rms_at_1_8", 6.5), ("1/64", "rms_at_1_64", 40.0)] {
         let rms = number(&last, key) * 1e5;
-        rows.push(at_most(format!("rms at {share} of the triangles, {name}"), rms, most * 1e5, "e-5 of the diagonal"));
+        rows.push(at_most(format!("rms at {share} of the triangles, {name}"), rms, most, "e-5 of the diagonal"));
     }
     Ok(())
 }
