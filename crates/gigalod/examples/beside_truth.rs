@@ -27,7 +27,9 @@ const SIZE: ImageSize = ImageSize { width: 800, height: 600 };
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, out, rest @ ..] = &arguments[..] else {
-        anyhow::bail!("usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid|geometry]]]");
+        anyhow::bail!(
+            "usage: beside_truth MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid|geometry]]]"
+        );
     };
     let number = |at: usize, default: f64| rest.get(at).map_or(Ok(default), |text: &String| text.parse::<f64>());
     let (orbit_deg, zoom, threshold_px) = ([number(0, 0.0)?, number(1, 0.0)?], number(2, 1.0)?, number(3, 1.0)?);
