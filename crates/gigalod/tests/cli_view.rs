@@ -158,9 +158,14 @@ impl Viewing<'_> {
     }
 
     /// Closes the window; the figures.
-    fn closes(mut self) -> Value {
+    fn closes(self) -> Value {
+        self.closed().done().json()
+    }
+
+    /// Closes the window; how the viewer ended.
+    fn closed(mut self) -> Ran {
         self.presses("ctrl+q");
-        Ran::of(self.child.take().unwrap().wait_with_output().unwrap()).done().json()
+        Ran::of(self.child.take().unwrap().wait_with_output().unwrap())
     }
 }
 
@@ -340,12 +345,13 @@ fn what_is_wrong_is_told_in_the_window_and_a_window_that_cannot_be_is_an_error()
     // All three are told in red.
     let red = || screen.pixels().iter().filter(|[r, g, b]| *r > 90 && *g < 50 && *b < 50).count();
     waits_until(|| red() > 3000);
-    let figures = viewing.closes();
-    let problems: Vec<&str> =
-        figures["problems"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
-    assert_eq!(problems.len(), 3, "{problems:?}");
-    assert!(problems.iter().any(|problem| problem.starts_with("broken.toml: ") && problem.ends_with("(line 1)")));
-    assert!(problems.iter().any(|problem| problem.starts_with("nothing.ply: ")));
+    let ran = viewing.closed();
+    assert_eq!(ran.status, 1, "nothing was shown: {ran:?}");
+    let told: Vec<&str> = ran.stderr.lines().collect();
+    assert_eq!(told.len(), 3, "{told:?}");
+    assert!(told[..2].iter().all(|line| line.starts_with("warning: ")) && told[2].starts_with("error: "), "{told:?}");
+    assert!(told.iter().any(|line| line.contains("broken.toml: ") && line.ends_with("(line 1)")), "{told:?}");
+    assert!(told.iter().any(|line| line.contains("nothing.ply: ")), "{told:?}");
 
     let ran = command().args(["view", "--json"]).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap();
     let ran = Ran::of(ran);

@@ -64,7 +64,7 @@ struct Spread {
     max: Option<f32>,
 }
 
-pub(crate) fn run(args: &ViewArgs, _console: &Console) -> Result<Outcome, CliError> {
+pub(crate) fn run(args: &ViewArgs, console: &Console) -> Result<Outcome, CliError> {
     if args.camera.up.is_some() {
         return Err(
             CliError::usage("the viewer keeps the model's up, expected no --up").hint("a scene has an up = \"z\"")
@@ -106,6 +106,16 @@ pub(crate) fn run(args: &ViewArgs, _console: &Console) -> Result<Outcome, CliErr
         ViewError::Render(error) => super::stage::graphics_error(error),
         ViewError::Threads(_) | ViewError::Forced => CliError::new(error),
     })?;
+    // The window has told all of it; who called the program has not seen that.
+    let Report { tally, .. } = &report;
+    let nothing_shown = tally.last.as_ref().is_none_or(|last| last.frames == 0);
+    let failed = nothing_shown && !args.files.is_empty();
+    for problem in tally.problems.iter().skip(usize::from(failed)) {
+        console.warn(&CliError::new(problem));
+    }
+    if let (true, Some(first)) = (failed, tally.problems.first()) {
+        return Err(CliError::new(first));
+    }
     let text = describe(&report);
     Ok(Outcome::new(&json(report), text))
 }
