@@ -16,8 +16,8 @@ pub(crate) enum Finished {
     Wrote(PathBuf, Result<PathBuf, String>),
 }
 
-/// Names a job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Names a job; in the order in which they were begun.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct JobNumber(u64);
 
 /// A file that is being opened.

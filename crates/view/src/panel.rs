@@ -54,7 +54,7 @@ impl Viewer {
             ui.toggle_value(&mut self.shows_help, "Keys (F1)");
         });
         let (mut removed, mut looked_at): (Option<ModelKey>, Option<ModelKey>) = (None, None);
-        for Staged { key, model, preview } in &self.models {
+        for Staged { key, model, preview, .. } in &self.models {
             ui.horizontal(|ui| {
                 if ui.small_button("x").on_hover_text("Take this model away").clicked() {
                     removed = Some(*key);

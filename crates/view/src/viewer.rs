@@ -37,6 +37,8 @@ use std::sync::mpsc::{Receiver, Sender};
 pub(crate) struct Staged {
     pub(crate) key: ModelKey,
     pub(crate) model: Model,
+    /// Who opened it: models stand in the order in which they were asked for.
+    pub(crate) asked: JobNumber,
     /// Of a preview: who builds the model, and how many of its points are shown.
     pub(crate) preview: Option<(JobNumber, u64)>,
 }

@@ -40,7 +40,7 @@ impl Viewer {
         let previews: Vec<(JobNumber, Preview)> =
             self.jobs.running().iter().filter_map(|job| Some((job.number, job.work.take_preview()?))).collect();
         for (job, Preview { model, points }) in previews {
-            self.add(model, Some((job, points)));
+            self.add(model, job, Some((job, points)));
             self.show_whole();
         }
         for finished in self.jobs.finished() {
@@ -48,7 +48,7 @@ impl Viewer {
                 Finished::Opened(job, opened) => {
                     let previews = self.previews_of(job);
                     match *opened {
-                        Ok(opened) => self.take(opened, !previews.is_empty(), now),
+                        Ok(opened) => self.take(opened, job, !previews.is_empty(), now),
                         Err(error) => self.notice_error(&error),
                     }
                     // Not before the model is there: something is shown all the time.
@@ -77,17 +77,17 @@ impl Viewer {
     }
 
     /// Shows what was opened; from where a person looks at its preview, if there was one.
-    fn take(&mut self, opened: Opened, had_preview: bool, now: f64) {
+    fn take(&mut self, opened: Opened, job: JobNumber, had_preview: bool, now: f64) {
         match opened {
             Opened::Model(model) => {
-                self.add(model, None);
+                self.add(model, job, None);
                 if had_preview {
                     self.navigation.set_bounds(self.bounds(), self.size);
                 } else {
                     self.show_whole();
                 }
             }
-            Opened::Scene(scene) => self.show_scene(scene),
+            Opened::Scene(scene) => self.show_scene(scene, job),
             Opened::Folder(folder) => self.folder = Some(folder),
             Opened::Path(path) => {
                 self.recorder.load(path);

@@ -28,16 +28,17 @@ fn unit_of(model: &Model) -> Option<&str> {
 }
 
 impl Viewer {
-    /// Puts a model on the stage.
-    pub(super) fn add(&mut self, model: Model, preview: Option<(JobNumber, u64)>) {
+    /// Puts a model on the stage, in its place in the list, whichever was read first.
+    pub(super) fn add(&mut self, model: Model, asked: JobNumber, preview: Option<(JobNumber, u64)>) {
         let key = ModelKey(self.next_key);
         self.next_key += 1;
         self.mailbox.order(Order::Add(key, model.file.clone(), model.placements.clone()));
         let _ = self.ask.send(Question::Add(key, model.clone()));
-        if self.models.is_empty() {
+        let place = self.models.partition_point(|staged| staged.asked <= asked);
+        if place == 0 {
             self.names = Names::of(&model.source);
         }
-        self.models.push(Staged { key, model, preview });
+        self.models.insert(place, Staged { key, model, asked, preview });
     }
 
     pub(crate) fn remove(&mut self, key: ModelKey) {
@@ -47,7 +48,7 @@ impl Viewer {
         self.measuring = Measuring::default();
     }
 
-    pub(super) fn show_scene(&mut self, scene: OpenedScene) {
+    pub(super) fn show_scene(&mut self, scene: OpenedScene, asked: JobNumber) {
         let OpenedScene { description, models } = scene;
         let gone: Vec<ModelKey> = self.models.iter().map(|staged| staged.key).collect();
         gone.into_iter().for_each(|key| self.remove(key));
@@ -55,7 +56,7 @@ impl Viewer {
         self.settings.background = description.background.unwrap_or(self.settings.background);
         self.settings.towards_light = description.towards_light();
         description.not_drawn().iter().for_each(|missing| self.notice_error(missing));
-        models.into_iter().for_each(|model| self.add(model, None));
+        models.into_iter().for_each(|model| self.add(model, asked, None));
         let camera = description.camera.unwrap_or_default();
         self.fov_deg = camera.fov_deg.unwrap_or(self.fov_deg);
         self.show_whole();
