@@ -34,7 +34,12 @@ fn keeps_its_word(model: &str, count: u64) {
         let touched = supersampled_coverage(&bvh, &camera, 4);
         let drawn = Drawn { depth: &picture.depth, data_footprint_px: Some(&picture.footprint_px) };
         // Close up, leaves are as exact as their grid; what that comes to is said.
-        let error_px = threshold_px.max(if report.limited_by.is_some() { report.max_error_px } else { 0.0 });
+        // Where something reaches the eye itself nothing is claimed, and nothing can be judged.
+        if report.max_error_px.is_infinite() {
+            continue;
+        }
+        let limited_px = if report.limited_by.is_some() { report.max_error_px } else { 0.0 };
+        let error_px = threshold_px.max(limited_px);
         let verdict = judge(&truth, &touched, &drawn, f64::from(error_px));
         let what = format!("{model}, pose {index} ({place:?}), {error_px} px");
         let open: Vec<_> = verdict.holes.iter().filter(|hole| !hole.within_error).collect();
@@ -43,9 +48,7 @@ fn keeps_its_word(model: &str, count: u64) {
         assert!(report.limited_by.is_some() || report.max_error_px <= threshold_px, "{what}: {report:?}");
         steep += verdict.holes.len();
         judged += verdict.judged.count();
-        if let Some(error) = screen_error::largest(&bvh, &camera, &picture.depth)
-            && report.max_error_px.is_finite()
-        {
+        if let Some(error) = screen_error::largest(&bvh, &camera, &picture.depth) {
             finite += 1;
             // A point is a square, a line has a width; both say how wide.
             let [x, y] = error.pixel;
