@@ -33,8 +33,8 @@ fn keeps_its_word(model: &str, count: u64) {
         let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
         let touched = supersampled_coverage(&bvh, &camera, 4);
         let drawn = Drawn { depth: &picture.depth, data_footprint_px: Some(&picture.footprint_px) };
-        // Close up, leaves are as exact as their grid; what that comes to is said.
-        // Where something reaches the eye itself nothing is claimed, and nothing can be judged.
+        // Leaves are as exact as their grid; what that comes to close up is said. Where the eye is nearer than that to the surface, it is
+        // infinite, and there is nothing to judge.
         if report.max_error_px.is_infinite() {
             continue;
         }
@@ -59,7 +59,7 @@ fn keeps_its_word(model: &str, count: u64) {
         }
     }
     println!("{model}: {finite} finite claims, the tightest is met to {tightest:.2}; {steep} of {judged} steep");
-    assert!(finite >= count / 3 && tightest > 0.3, "claims are about something: {finite}, {tightest}");
+    assert!(finite * 10 >= count * 9 && tightest > 0.3, "claims are about something: {finite}, {tightest}");
     assert!((steep as f64) < MOST_STEEP * judged as f64, "{steep} of {judged}");
 }
 

@@ -42,8 +42,8 @@ pub(crate) enum Order {
     Add(ModelKey, ModelFile, Vec<Similarity>),
     /// Takes it out again.
     Remove(ModelKey),
-    /// A picture of what is shown as soon as it is as fine as it gets, or as it is when it is to change.
-    Picture(PathBuf),
+    /// A picture of what is wished for, as fine as it gets.
+    Picture(PathBuf, Wish),
     /// Go on with another device.
     MoveTo(Box<Gpu>),
 }

@@ -3,8 +3,12 @@
 //! Goes in: wishes and orders. Comes out: pictures on the device, and figures. While wishes change, each frame is as fine as its
 //! time allows; once they rest it is refined step by step, until a new wish comes: that breaks a cut off at once.
 //!
+//! Pictures for files are taken by [`pictures`].
+//!
 //! What always holds: a rested picture is that of `render` for the same camera, look and budgets, bit for bit; what goes wrong with
 //! files or the device is told and survived.
+
+mod pictures;
 
 use crate::clock::thread_cpu_ms;
 use crate::mailbox::{Figures, Mail, Mailbox, ModelKey, News, Order, Wish};
@@ -14,7 +18,7 @@ use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::{
     CutReport, DrawSource, Fineness, FrameRate, Instance, InstanceId, Magnified, Residency, Scene, ViewId,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -63,7 +67,10 @@ pub(crate) struct Stage {
     lost: bool,
     /// What a device without enough memory has left.
     most_splats: u64,
-    pictures: Vec<PathBuf>,
+    /// What the last cut is for, where that is as fine as it gets.
+    cut: Option<Wish>,
+    /// To be taken.
+    pictures: VecDeque<(PathBuf, Wish)>,
     frames: u64,
 }
 
@@ -87,7 +94,8 @@ impl Stage {
             stuck: false,
             lost: false,
             most_splats: u64::MAX,
-            pictures: Vec::new(),
+            cut: None,
+            pictures: VecDeque::new(),
             frames: 0,
         })
     }
@@ -97,7 +105,6 @@ impl Stage {
         loop {
             let rests = self.wish.is_none() || self.lost || self.stuck || !self.changed && self.control.is_settled();
             let wait = if rests {
-                // What was ordered of a finished picture can be had now.
                 self.take_pictures();
                 None
             } else if !self.changed && self.waits_for_pages() {
@@ -107,6 +114,9 @@ impl Stage {
             };
             let Mail { wish, orders, closed } = self.mailbox.receive(wait);
             if closed {
+                orders.into_iter().for_each(|order| self.obey(order));
+                // Nobody is left to break it off.
+                self.take_pictures();
                 return;
             }
             if let Some((number, wish)) = wish {
@@ -140,8 +150,6 @@ impl Stage {
         if before == Some(wish) {
             return;
         }
-        // Before it is gone.
-        self.take_pictures();
         if before.is_none_or(|before| before.target_ms != wish.target_ms || before.finest_px != wish.finest_px) {
             self.control = FrameRate::new(wish.target_ms, wish.finest_px).with_larger_pixels();
         }
@@ -168,8 +176,8 @@ impl Stage {
                     self.scene.remove(id);
                 }
             }
-            Order::Picture(name) => {
-                self.pictures.push(name);
+            Order::Picture(name, wish) => {
+                self.pictures.push_back((name, wish));
                 return;
             }
             Order::MoveTo(gpu) => match self.renderer.move_to(*gpu) {
@@ -183,6 +191,7 @@ impl Stage {
     fn frame(&mut self, number: u64, wish: &Wish) {
         let (begun, cpu_begun) = (Instant::now(), thread_cpu_ms());
         let moved = self.changed;
+        self.cut = None;
         self.control.share(self.painting_ms);
         let wanted = self.control.next(moved);
         let room = self.renderer.most_splats(wish.camera.size, wish.look.kernel);
@@ -237,7 +246,9 @@ impl Stage {
         let frame_ms = (begun.elapsed() - waited).as_secs_f64() * 1e3;
         self.control.drew(frame_ms, &report, self.scene.residency().is_loading());
         self.changed = false;
+        let settled = self.control.is_settled();
         self.drawn = Some(Drawn { wish: *wish, threshold_px: report.threshold_px, pixel_edge_px });
+        self.cut = settled.then_some(*wish);
         // As it is on the screen.
         let report = magnified.report(&report);
         self.frames += 1;
@@ -254,7 +265,7 @@ impl Stage {
             cpu_bytes: self.scene.cpu_bytes(),
             gpu_bytes: self.renderer.gpu_bytes(),
             bytes_read: self.scene.residency().bytes_read(),
-            settled: self.control.is_settled(),
+            settled,
             frames: self.frames,
             problems: self.problems(&report),
         };
@@ -280,27 +291,6 @@ impl Stage {
         self.lost = true;
         self.mailbox.forget_shown();
         self.mailbox.tell(News::DeviceLost(why));
-    }
-
-    /// Draws what is shown once more, for a file.
-    fn take_pictures(&mut self) {
-        let Some(Drawn { wish, .. }) = self.drawn.as_ref().filter(|_| !self.pictures.is_empty() && !self.lost) else {
-            return;
-        };
-        let draws =
-            self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-        let picture = self.renderer.picture(&Frame { camera: wish.camera, look: wish.look, draws });
-        if let Err(RenderError::DeviceLost(why)) = picture {
-            // The next device draws them.
-            self.lose(why);
-            return;
-        }
-        for name in std::mem::take(&mut self.pictures) {
-            self.mailbox.tell(match &picture {
-                Ok(picture) => News::Picture(name, picture.size, picture.rgba.clone()),
-                Err(error) => News::Problem(format!("{}: {error}", name.display())),
-            });
-        }
     }
 
     fn problems(&self, report: &CutReport) -> Vec<String> {

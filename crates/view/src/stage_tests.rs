@@ -1,11 +1,11 @@
-//! The stage without a window: a device that is lost, and another that goes on.
+//! The stage without a window: pictures for files; a device that is lost, and another that goes on.
 
 use crate::mailbox::{Mailbox, ModelKey, News, Order, Wish};
 use crate::settings::Settings;
 use crate::stage::Stage;
 use crate::viewer_tests::statue;
 use gigalod_geom::camera::UpAxis;
-use gigalod_geom::{Camera, ImageSize};
+use gigalod_geom::{Aabb, Camera, ImageSize};
 use gigalod_render::{Gpu, Renderer};
 use gigalod_runtime::Similarity;
 use std::path::PathBuf;
@@ -43,51 +43,107 @@ fn picture(news: News) -> Option<(PathBuf, Vec<u8>)> {
     }
 }
 
+/// A stage that shows the statue, and wishes for it.
+struct Staged {
+    _folder: tempfile::TempDir,
+    mailbox: Arc<Mailbox>,
+    thread: std::thread::JoinHandle<()>,
+    bounds: Aabb,
+}
+
+impl Staged {
+    fn on(gpu: Gpu) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let file = statue(folder.path());
+        let mailbox = Arc::new(Mailbox::new(|| {}));
+        let stage = Stage::new(mailbox.clone(), Renderer::new(gpu).unwrap(), Settings::default()).unwrap();
+        let thread = std::thread::spawn(|| stage.run());
+        let bounds = file.skeleton().root().bounds;
+        mailbox.order(Order::Add(ModelKey(0), file.into(), vec![Similarity::IDENTITY]));
+        Self { _folder: folder, mailbox, thread, bounds }
+    }
+
+    fn wish(&self, azimuth_deg: f64) -> Wish {
+        let settings = Settings::default();
+        let size = ImageSize { width: 320, height: 200 };
+        Wish {
+            camera: Camera::orbit(&self.bounds, UpAxis::Y, [azimuth_deg, 0.0], 1.0, 0.7, size),
+            look: settings.look(),
+            tint: settings.tint,
+            finest_px: settings.finest_px,
+            target_ms: settings.target_ms,
+            cpu_budget: settings.cpu_budget,
+            gpu_budget: settings.gpu_budget,
+        }
+    }
+
+    /// Wishes for it, and a picture of it.
+    fn takes(&self, number: u64, name: &str, azimuth_deg: f64) {
+        self.mailbox.wish(number, self.wish(azimuth_deg));
+        self.mailbox.order(Order::Picture(name.into(), self.wish(azimuth_deg)));
+    }
+}
+
+#[test]
+fn a_picture_is_as_fine_as_it_gets_whatever_is_wished_for_meanwhile() {
+    let Some(gpu) = gpu() else { return };
+    let staged = Staged::on(gpu);
+    let mailbox = &staged.mailbox;
+    let taken = || hears(mailbox, picture);
+    staged.takes(1, "rested", 20.0);
+    let (_, rested) = taken();
+    // Looked away from before it is drawn at all, or as it is being refined.
+    let mut number = 2;
+    for wait_ms in [0, 20, 60, 200] {
+        mailbox.wish(number, staged.wish(80.0));
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        staged.takes(number + 1, "moved", 20.0);
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        mailbox.wish(number + 2, staged.wish(50.0 + number as f64));
+        number += 3;
+        let (name, moved) = taken();
+        assert_eq!(name, PathBuf::from("moved"));
+        assert!(moved == rested, "the same picture, after {wait_ms} ms");
+    }
+    // In their order, and those that nobody has waited for.
+    staged.takes(number, "first", 20.0);
+    staged.takes(number + 1, "second", 20.0);
+    mailbox.wish(number + 2, staged.wish(0.0));
+    mailbox.close();
+    staged.thread.join().unwrap();
+    let news: Vec<_> = mailbox.collect().news.into_iter().filter_map(picture).collect();
+    assert_eq!(news.iter().map(|(name, _)| name.to_str().unwrap()).collect::<Vec<_>>(), ["first", "second"]);
+    assert!(news.iter().all(|(_, rgba)| *rgba == rested));
+}
+
 #[test]
 fn a_lost_device_is_told_and_another_draws_what_was_asked_of_it() {
     let Some(gpu) = gpu() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let file = statue(folder.path());
-    let mailbox = Arc::new(Mailbox::new(|| {}));
-    let settings = Settings::default();
-    let stage = Stage::new(mailbox.clone(), Renderer::new(gpu.clone()).unwrap(), settings).unwrap();
-    let thread = std::thread::spawn(|| stage.run());
-    let size = ImageSize { width: 320, height: 200 };
-    let wish = |azimuth_deg: f64| Wish {
-        camera: Camera::orbit(&file.skeleton().root().bounds, UpAxis::Y, [azimuth_deg, 0.0], 1.0, 0.7, size),
-        look: settings.look(),
-        tint: settings.tint,
-        finest_px: settings.finest_px,
-        target_ms: settings.target_ms,
-        cpu_budget: settings.cpu_budget,
-        gpu_budget: settings.gpu_budget,
-    };
-    mailbox.order(Order::Add(ModelKey(0), file.clone().into(), vec![Similarity::IDENTITY]));
-    mailbox.wish(1, wish(20.0));
-    mailbox.order(Order::Picture("before".into()));
-    let (name, before) = hears(&mailbox, picture);
+    let staged = Staged::on(gpu.clone());
+    let mailbox = &staged.mailbox;
+    staged.takes(1, "before", 20.0);
+    let (name, before) = hears(mailbox, picture);
     assert_eq!(name, PathBuf::from("before"));
     assert!(mailbox.shown().is_some());
     // At rest: the picture is what needs the device.
     gpu.close();
-    mailbox.order(Order::Picture("after".into()));
+    staged.takes(1, "after", 20.0);
     let lost = |news| matches!(news, News::DeviceLost(_)).then_some(());
-    hears(&mailbox, lost);
+    hears(mailbox, lost);
     assert!(mailbox.shown().is_none(), "what lies on a lost device cannot be shown");
     let other = Gpu::open().unwrap();
     mailbox.order(Order::MoveTo(Box::new(other.clone())));
-    let (name, after) = hears(&mailbox, picture);
+    let (name, after) = hears(mailbox, picture);
     assert_eq!(name, PathBuf::from("after"), "it was not forgotten");
     assert!(before == after, "the same picture");
     // While it moves.
     other.close();
-    mailbox.wish(2, wish(50.0));
-    hears(&mailbox, lost);
+    mailbox.wish(2, staged.wish(50.0));
+    hears(mailbox, lost);
     mailbox.order(Order::MoveTo(Box::new(Gpu::open().unwrap())));
-    mailbox.wish(3, wish(20.0));
-    mailbox.order(Order::Picture("again".into()));
-    let (_, again) = hears(&mailbox, picture);
+    staged.takes(3, "again", 20.0);
+    let (_, again) = hears(mailbox, picture);
     assert!(before == again, "the same picture");
     mailbox.close();
-    thread.join().unwrap();
+    staged.thread.join().unwrap();
 }

@@ -29,7 +29,7 @@ use crate::settings::{FirstLook, Options, Settings};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use glam::DVec2;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -81,6 +81,8 @@ pub(crate) struct Viewer {
     /// A person wants another device.
     pub(crate) wants_new_device: bool,
     pub(crate) wants_to_quit: bool,
+    /// Names of pictures that show what is wished for next.
+    ordered_pictures: Vec<PathBuf>,
     last_wish: Option<Wish>,
     wish_number: u64,
     told_problems: Vec<String>,
@@ -138,6 +140,7 @@ impl Viewer {
             wants_recovery: None,
             wants_new_device: false,
             wants_to_quit: false,
+            ordered_pictures: Vec::new(),
             last_wish: None,
             wish_number: 0,
             told_problems: Vec::new(),
@@ -251,6 +254,9 @@ impl Viewer {
             self.tally.wished(self.wish_number);
             self.mailbox.wish(self.wish_number, wish);
         }
+        for name in self.ordered_pictures.drain(..) {
+            self.mailbox.order(Order::Picture(name, wish));
+        }
     }
 
     /// At exit, when nobody looks any more: ends builds, and waits until all that is being written is on disk.
@@ -269,8 +275,8 @@ impl Viewer {
             self.notice("nothing to take a picture of", now);
             return;
         }
-        self.mailbox.order(Order::Picture(self.names.next_picture()));
-        self.notice("the picture is taken as soon as it is as fine as it gets", now);
+        self.ordered_pictures.push(self.names.next_picture());
+        self.notice("the picture is taken of this view, as fine as it gets, as soon as nothing moves", now);
     }
 
     pub(crate) fn toggle_recording(&mut self, now: f64) {

@@ -244,7 +244,7 @@ fn what_is_chosen_in_the_panel_is_wished_for() {
     assert!(levels.tint != before.tint && levels.camera == before.camera);
     person.presses(egui::Key::P);
     let orders = wished(&mut person).orders;
-    assert!(matches!(&orders[..], [Order::Picture(name)] if name == Path::new("statue-1.png")));
+    assert!(matches!(&orders[..], [Order::Picture(name, of)] if name == Path::new("statue-1.png") && *of == levels));
     assert_eq!(person.viewer().names.picture, "statue-2.png");
     person.presses(egui::Key::F1);
     assert!(person.harness.query_by_label("Mouse and keys").is_some());

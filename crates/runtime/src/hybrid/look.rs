@@ -13,7 +13,7 @@ use gigalod_geom::projected;
 use glam::DVec3;
 
 /// A point is drawn as a square at least `spacing` wide; so far it reaches, in spacings.
-const POINT_REACH: f64 = std::f64::consts::FRAC_1_SQRT_2;
+pub(super) const POINT_REACH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A hierarchy as one view sees it.
 #[derive(Debug)]
@@ -47,8 +47,15 @@ pub(super) struct Sight {
 /// The box of a node's vertices and points; eye space, the model's axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NodeBox {
-    center: DVec3,
-    half: DVec3,
+    pub(super) center: DVec3,
+    pub(super) half: DVec3,
+}
+
+/// Positions of a node: where they count from, and how long a step is; eye space, the model's axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    pub(super) min: DVec3,
+    pub(super) step: f64,
 }
 
 impl<'a> Look<'a> {
@@ -127,9 +134,33 @@ impl<'a> Look<'a> {
         cone.faces_away(center.as_vec3(), (half.length() as f32).next_up())
     }
 
-    pub(super) fn node_box(&self, record: &NodeRecord) -> NodeBox {
+    /// The same of something in the picture that is no nearer to the eye than this.
+    pub(super) fn error_px_beyond(&self, distance: f64, error: f64) -> f32 {
+        let depth = distance / self.largest_slope.hypot(1.0);
+        if depth == f64::INFINITY {
+            0.0
+        } else {
+            projected::shift_px(self.largest_slope, depth, error, self.focal_px) as f32
+        }
+    }
+
+    /// False where nothing that is no farther than this from what lies between some points is in the picture.
+    pub(super) fn may_show(&self, points: &[DVec3], off: f64) -> bool {
+        let is_outside = |inward: &DVec3| {
+            let off = inward.length() * off;
+            points.iter().all(|point| inward.dot(*point) + off < 0.0)
+        };
+        !self.planes.iter().any(is_outside)
+    }
+
+    /// Where a node's positions are.
+    pub(super) fn grid(&self, record: &NodeRecord) -> Grid {
         let step = self.step * exp2(-i64::from(record.level));
-        let min = self.origin_in_eye + DVec3::from_array(record.min_steps.map(f64::from)) * step;
+        Grid { min: self.origin_in_eye + DVec3::from_array(record.min_steps.map(f64::from)) * step, step }
+    }
+
+    pub(super) fn node_box(&self, record: &NodeRecord) -> NodeBox {
+        let Grid { min, step } = self.grid(record);
         let half = DVec3::from_array(record.extent_steps.map(f64::from)) * (step * 0.5);
         NodeBox { center: min + half, half }
     }
@@ -159,4 +190,4 @@ fn exp2(exponent: i64) -> f64 {
 
 #[cfg(test)]
 #[path = "look_tests.rs"]
-mod tests;
+pub(super) mod tests;

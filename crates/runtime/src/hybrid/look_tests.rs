@@ -7,9 +7,9 @@ use glam::{DQuat, Vec3};
 use proptest::prelude::*;
 
 const SIZE: ImageSize = ImageSize { width: 320, height: 180 };
-const ORIGIN: DVec3 = DVec3::new(-1.0, 2.0, 0.5);
+pub(in crate::hybrid) const ORIGIN: DVec3 = DVec3::new(-1.0, 2.0, 0.5);
 
-fn skeleton(closed: bool, record: NodeRecord) -> Skeleton {
+pub(in crate::hybrid) fn skeleton(closed: bool, record: NodeRecord) -> Skeleton {
     let root = Root {
         origin: ORIGIN,
         edge: 1.0,
@@ -28,7 +28,7 @@ fn skeleton(closed: bool, record: NodeRecord) -> Skeleton {
     Skeleton::new(root, vec![record], 0)
 }
 
-fn record(min_steps: [i32; 3], extent_steps: [u16; 3], error: f32) -> NodeRecord {
+pub(in crate::hybrid) fn record(min_steps: [i32; 3], extent_steps: [u16; 3], error: f32) -> NodeRecord {
     NodeRecord {
         level: 1,
         first_child: 0,
@@ -50,7 +50,7 @@ fn record(min_steps: [i32; 3], extent_steps: [u16; 3], error: f32) -> NodeRecord
 }
 
 /// A placement and a camera that looks at about where its model stands.
-fn view(eye: [f64; 3], target: [f64; 3], turn: f64) -> ModelView {
+pub(in crate::hybrid) fn view(eye: [f64; 3], target: [f64; 3], turn: f64) -> ModelView {
     let camera = Camera::look_at(eye.into(), target.into(), DVec3::Y, 0.9, SIZE);
     let placement =
         Similarity { position: DVec3::new(0.3, 0.1, 0.0), rotation: DQuat::from_rotation_z(turn), scale: 1.5 };
@@ -58,7 +58,7 @@ fn view(eye: [f64; 3], target: [f64; 3], turn: f64) -> ModelView {
 }
 
 /// Where a point of the model is in the picture, if it is.
-fn pixel(view: &ModelView, point: DVec3) -> Option<glam::DVec2> {
+pub(in crate::hybrid) fn pixel(view: &ModelView, point: DVec3) -> Option<glam::DVec2> {
     let in_view = view.camera.view_point(point);
     let pixel = view.camera.pixel_of_view_point(in_view);
     let is_in = in_view.z > 0.0 && (0.0..=320.0).contains(&pixel.x) && (0.0..=180.0).contains(&pixel.y);

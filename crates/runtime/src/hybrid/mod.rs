@@ -3,12 +3,13 @@
 //! Source: the hybrid paper, section 4. Differs: the error is bounded where a node may be seen, rather than at its middle, and a node
 //! is opened only when all its children in sight are resident.
 //!
-//! Start at [`HybridSelector`]; `look` says what a view knows of a node, `family` how a cut goes down.
+//! Start at [`HybridSelector`]; `look` says what a view knows of a node, `near` what of one around the eye, `family` how a cut goes down.
 
 mod area;
 mod family;
 mod list;
 mod look;
+mod near;
 mod selector;
 
 pub use list::{HybridList, HybridNode};

@@ -233,7 +233,13 @@ impl Walk<'_> {
         self.report.drawn += 1;
         self.report.triangles += u64::from(record.triangles);
         self.report.points += u64::from(record.points);
-        self.report.max_error_px = self.report.max_error_px.max(sight.error_px);
+        // A box around the eye is as near as can be; what is in it need not be.
+        let error_px = match limit {
+            Some(Limit::Data) if self.look.is_near(record) => sight.error_px.min(self.look.error_px_of(record, &page)),
+            _ => sight.error_px,
+        };
+        let limit = limit.filter(|_| error_px > self.input.threshold_px);
+        self.report.max_error_px = self.report.max_error_px.max(error_px);
         self.report.limited_by = self.report.limited_by.max(limit);
         if self.report.primitives() > self.input.most_splats {
             return Err(Outcome::TooMany);
