@@ -17,8 +17,8 @@ pub struct Settings {
     pub background: [u8; 3],
     /// Colours of the model, or one for each level of detail.
     pub tint: Tint,
-    /// Error at rest, in pixels.
-    pub finest_px: f32,
+    /// Error at rest, in pixels; `None` for what suits the models.
+    pub finest_px: Option<f32>,
     /// Milliseconds of a frame while the camera moves.
     pub target_ms: f64,
     /// Bytes for pages and lists.
@@ -41,7 +41,7 @@ impl Default for Settings {
             towards_light: None,
             background: [32, 32, 36],
             tint: Tint::Model,
-            finest_px: 1.0,
+            finest_px: None,
             target_ms: 50.0,
             cpu_budget: 1 << 30,
             gpu_budget: None,

@@ -86,7 +86,8 @@ impl Stage {
             renderer,
             scene,
             instances: BTreeMap::new(),
-            control: FrameRate::new(settings.target_ms, settings.finest_px).with_larger_pixels(),
+            // How fine, the first wish says.
+            control: FrameRate::new(settings.target_ms, 1.0).with_larger_pixels(),
             painting_ms: 0.0,
             wish: None,
             drawn: None,

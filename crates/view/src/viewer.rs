@@ -245,8 +245,8 @@ impl Viewer {
         if self.models.is_empty() {
             return;
         }
-        let Settings { tint, finest_px, target_ms, cpu_budget, gpu_budget, .. } = self.settings;
-        let camera = self.camera(viewpoint);
+        let Settings { tint, target_ms, cpu_budget, gpu_budget, .. } = self.settings;
+        let (camera, finest_px) = (self.camera(viewpoint), self.finest_px());
         let wish = Wish { camera, look: self.settings.look(), tint, finest_px, target_ms, cpu_budget, gpu_budget };
         if self.last_wish != Some(wish) {
             self.last_wish = Some(wish);

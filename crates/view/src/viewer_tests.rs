@@ -253,6 +253,22 @@ fn what_is_chosen_in_the_panel_is_wished_for() {
 }
 
 #[test]
+fn the_error_at_rest_suits_the_models_until_somebody_says() {
+    let mut person = Person::opens(&["hybrid.glod"]);
+    let wished_px =
+        |person: &mut Person| person.viewer().mailbox.receive(Some(Duration::ZERO)).wish.map(|it| it.1.finest_px);
+    assert_eq!(wished_px(&mut person), Some(0.5), "half a pixel, of triangles");
+    person.viewer().open(Path::new("statue.glod"));
+    person.waits_until(|viewer| viewer.models.len() == 2);
+    assert_eq!(wished_px(&mut person), Some(1.0), "a pixel, where splats are among them");
+    for px in [0.0, 0.1, 3.0] {
+        person.viewer().settings.finest_px = Some(px);
+        person.harness.run_steps(3);
+        assert_eq!(wished_px(&mut person), Some(px), "even where the slider ends earlier");
+    }
+}
+
+#[test]
 fn a_preview_is_shown_until_the_model_is_there_and_nobody_is_moved() {
     let mut person = Person::opens(&[]);
     person.viewer().open(Path::new("raw.ply"));

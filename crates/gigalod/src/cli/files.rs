@@ -3,7 +3,6 @@
 use super::error::CliError;
 use gigalod_build::{FileIdentity, SideLog};
 #[cfg(feature = "view")]
-use gigalod_format::Kind;
 use gigalod_format::{Container, FileStore, FormatError};
 use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
 use gigalod_runtime::ModelFile;
@@ -73,12 +72,6 @@ pub(crate) fn open_container(path: &Path) -> Result<Container, CliError> {
 /// Opens a `.glod` file for drawing, of whichever kind it is.
 pub(crate) fn open_built(path: &Path) -> Result<ModelFile, CliError> {
     ModelFile::open(open_container(path)?).map_err(|error| CliError::format(path, &error))
-}
-
-/// True of a `.glod` file that is hybrid; what is wrong with others is told by whoever opens them.
-#[cfg(feature = "view")]
-pub(crate) fn is_hybrid(path: &Path) -> bool {
-    is_container(path).is_ok_and(|is| is) && open_container(path).is_ok_and(|file| file.kind() == Kind::Hybrid)
 }
 
 /// True when the file begins as a `.glod` file does; anything else is taken for a raw model.

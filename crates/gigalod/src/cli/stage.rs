@@ -168,9 +168,14 @@ impl Stage {
 }
 
 impl DrawArgs {
-    /// Largest error on screen, in pixels; 0 for everything there is. `default_px` where nobody says.
+    /// Largest error on screen, in pixels, where somebody says; 0 for everything there is.
+    pub(crate) fn asked_px(&self) -> Option<f64> {
+        if self.full { Some(0.0) } else { self.error }
+    }
+
+    /// The same, and `default_px` where nobody says.
     pub(crate) fn threshold_px(&self, default_px: f64) -> f64 {
-        if self.full { 0.0 } else { self.error.unwrap_or(default_px) }
+        self.asked_px().unwrap_or(default_px)
     }
 
     /// As asked for; what is not asked for, as the scene has it.

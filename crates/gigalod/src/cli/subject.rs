@@ -11,12 +11,6 @@ use gigalod_runtime::scene::description::SceneDescription;
 use gigalod_runtime::{ModelFile, Similarity};
 use std::path::Path;
 
-/// Default of `--error` where all models are hybrid.
-pub(crate) const HYBRID_ERROR_PX: f64 = 0.5;
-
-/// Where some are splats.
-pub(crate) const SPLAT_ERROR_PX: f64 = 1.0;
-
 /// Models in their places, open.
 pub(crate) struct Subject {
     /// What the scene says besides; nothing for a single model.
@@ -49,10 +43,9 @@ impl Subject {
         Ok(Self { description: SceneDescription::default(), models: vec![(model, vec![Similarity::IDENTITY])] })
     }
 
-    /// Largest error on screen, in pixels, where nobody says: of triangles half a pixel; the diameter of a splat is a pixel.
+    /// Largest error on screen, in pixels, where nobody says: what suits all models.
     pub(crate) fn default_error_px(&self) -> f64 {
-        let is_hybrid = self.models.iter().all(|(file, _)| file.hybrid().is_some());
-        if is_hybrid { HYBRID_ERROR_PX } else { SPLAT_ERROR_PX }
+        self.models.iter().map(|(file, _)| file.default_error_px()).fold(0.0, f64::max)
     }
 
     /// Which way is up: as the scene says, or the first model.

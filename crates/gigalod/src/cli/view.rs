@@ -2,10 +2,8 @@
 
 use super::args::ViewArgs;
 use super::error::{CliError, Outcome};
-use super::files;
 use super::path_file;
 use super::progress::Console;
-use super::subject::{HYBRID_ERROR_PX, SPLAT_ERROR_PX};
 use super::view_files::Files;
 use gigalod_geom::camera::DEFAULT_FOV_DEG;
 use gigalod_view::{FirstLook, Options, Report, Settings, ViewError, percentile};
@@ -81,9 +79,6 @@ pub(crate) fn run(args: &ViewArgs, console: &Console) -> Result<Outcome, CliErro
         _ => args.camera.orbit.map_or(FirstLook::Whole, FirstLook::Orbit),
     };
     let look = args.draw.look(&Default::default());
-    // Known only of files that need not be built.
-    let is_hybrid = !args.files.is_empty() && args.files.iter().all(|file| files::is_hybrid(file));
-    let default_px = if is_hybrid { HYBRID_ERROR_PX } else { SPLAT_ERROR_PX };
     let options = Options {
         files: args.files.clone(),
         settings: Settings {
@@ -91,7 +86,7 @@ pub(crate) fn run(args: &ViewArgs, console: &Console) -> Result<Outcome, CliErro
             towards_light: look.lighting.towards_light,
             background: look.lighting.background,
             tint: args.draw.tint(),
-            finest_px: args.draw.threshold_px(default_px) as f32,
+            finest_px: args.draw.asked_px().map(|px| px as f32),
             target_ms: args.target_ms,
             cpu_budget: args.draw.cpu_budget,
             gpu_budget: args.draw.gpu_budget,

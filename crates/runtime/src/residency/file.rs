@@ -96,6 +96,14 @@ impl ModelFile {
         }
     }
 
+    /// Largest error on screen, in pixels, where nobody says: of triangles half a pixel; the diameter of a splat is a pixel.
+    pub fn default_error_px(&self) -> f64 {
+        match self {
+            Self::Splats(_) => 1.0,
+            Self::Hybrid(_) => 0.5,
+        }
+    }
+
     /// The file, if it holds splats.
     pub fn splats(&self) -> Option<&Arc<SplatFile>> {
         match self {

@@ -87,6 +87,12 @@ impl Viewer {
         rest.iter().all(|staged| unit_of(&staged.model) == Some(unit)).then_some(unit)
     }
 
+    /// Error at rest, in pixels: as a person says, or as suits the models.
+    pub(crate) fn finest_px(&self) -> f32 {
+        let of_models = self.models.iter().map(|staged| staged.model.file.default_error_px() as f32).reduce(f32::max);
+        self.settings.finest_px.or(of_models).unwrap_or(1.0)
+    }
+
     /// Which way is up.
     pub(crate) fn up(&self) -> UpAxis {
         let first = self.models.first().map(|staged| std::slice::from_ref(&staged.model));

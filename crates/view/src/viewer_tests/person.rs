@@ -13,8 +13,8 @@ use gigalod_build::NoProgress;
 use gigalod_format::splats::SplatFile;
 use gigalod_format::{Container, FileStore};
 use gigalod_geom::{CameraPath, ImageSize};
-use gigalod_runtime::Similarity;
 use gigalod_runtime::scene::description::SceneDescription;
+use gigalod_runtime::{ModelFile, Similarity};
 use gigalod_synth::{Order as VertexOrder, StatueOptions};
 use glam::{DVec2, DVec3};
 use std::path::{Path, PathBuf};
@@ -29,6 +29,7 @@ pub(super) const MIDDLE: Pos2 = pos2(350.0, 350.0);
 
 /// One statue, whatever is asked for; and a list of what was written.
 pub(super) struct Files {
+    folder: PathBuf,
     pub(super) statue: Model,
     /// A raw model may be ready.
     pub(super) built: AtomicBool,
@@ -56,6 +57,7 @@ impl Host for Files {
                 }
                 Ok(Opened::Model(self.statue.clone()))
             }
+            Some("hybrid.glod") => Ok(Opened::Model(Model { file: hybrid(&self.folder), ..self.statue.clone() })),
             Some("statue.glod") => Ok(Opened::Model(self.statue.clone())),
             Some("folder") => {
                 let entry = |path: &str, kind, bytes| Entry { path: path.into(), kind, bytes };
@@ -83,12 +85,23 @@ impl Host for Files {
     }
 }
 
-pub(crate) fn statue(folder: &Path) -> Arc<SplatFile> {
-    let scan = folder.join("statue.ply");
-    let options = StatueOptions { triangles: 20_000, seed: 3, colors: false, order: VertexOrder::Coherent };
+fn scan(folder: &Path, triangles: u64) -> Box<dyn gigalod_import::ModelStream> {
+    let scan = folder.join(format!("statue{triangles}.ply"));
+    let options = StatueOptions { triangles, seed: 3, colors: false, order: VertexOrder::Coherent };
     let mut out = std::fs::File::create(&scan).unwrap();
     gigalod_synth::write_statue(options, &mut out, &mut |_, _| {}).unwrap();
-    let stream = gigalod_import::open(Box::new(std::fs::File::open(&scan).unwrap())).unwrap();
+    gigalod_import::open(Box::new(std::fs::File::open(&scan).unwrap())).unwrap()
+}
+
+/// Smaller than [`statue`].
+fn hybrid(folder: &Path) -> ModelFile {
+    let built = folder.join("hybrid.glod");
+    gigalod_build::hybrid::build(scan(folder, 2000), &Default::default(), &NoProgress, &built).unwrap();
+    ModelFile::open(Container::open(Arc::new(FileStore::open(&built).unwrap())).unwrap()).unwrap()
+}
+
+pub(crate) fn statue(folder: &Path) -> Arc<SplatFile> {
+    let stream = scan(folder, 20_000);
     let built = folder.join("statue.glod");
     gigalod_build::splats::build(stream, &Default::default(), &NoProgress, &built).unwrap();
     let container = Container::open(Arc::new(FileStore::open(&built).unwrap())).unwrap();
@@ -112,7 +125,12 @@ impl Person {
             unit: None,
             placements: vec![Similarity::IDENTITY],
         };
-        let files = Arc::new(Files { statue, built: AtomicBool::new(false), written: Mutex::default() });
+        let files = Arc::new(Files {
+            folder: folder.path().to_owned(),
+            statue,
+            built: AtomicBool::new(false),
+            written: Mutex::default(),
+        });
         let options = Options {
             files: names.iter().map(PathBuf::from).collect(),
             settings: Settings::default(),
