@@ -42,6 +42,25 @@ fn a_camera_path_leads_around_a_hybrid_file() {
     }
 }
 
+/// A picture of nothing and a status of 0 would say that all is well.
+#[test]
+fn a_budget_that_holds_nothing_is_an_error_that_says_what_would_do() {
+    if !cli_support::can_draw() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (model, out) = (folder.path().join("sphere.glod"), folder.path().join("out.png"));
+    std::fs::write(&model, Octree::sphere(4, false).bytes()).unwrap();
+    let ran = run!["render", model, "-o", out, "--size", "64x64", "--cpu-budget", "1000"];
+    assert_eq!(ran.status, 1, "{ran:?}");
+    let needed = ran.stderr.split_whitespace().find_map(|word| word.parse::<u64>().ok()).expect("it says how many");
+    let text = format!("error: the coarsest picture needs {needed} bytes of memory, expected at most 1000\n");
+    assert_eq!(ran.stderr, text + "hint: give a larger --cpu-budget\n");
+    assert!(!out.exists());
+    run!["render", model, "-o", out, "--size", "64x64", "--cpu-budget", needed.to_string()].done();
+    assert!(out.exists());
+}
+
 #[test]
 fn a_damaged_hybrid_file_is_an_error_of_one_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,7 @@ use crate::settings::Settings;
 use gigalod_render::{Frame, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::{
-    CutReport, DrawSource, Fineness, FrameRate, Instance, InstanceId, Magnified, Residency, Scene, ViewId,
+    CutReport, DrawSource, Fineness, FrameRate, Instance, InstanceId, Limit, Magnified, Residency, Scene, ViewId,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
@@ -36,6 +36,13 @@ const LONGEST_PAINTING: Duration = Duration::from_millis(30);
 
 /// Weight of the last frame in how long painting takes.
 const PAINTING_GAIN: f64 = 0.2;
+
+/// A model whose pages are on their way is not shown before its error is no larger than this, in pixels: a disc over the whole window
+/// is no first picture of it.
+const FIRST_ERROR_PX: f32 = 40.0;
+
+/// But it is shown after this time in any case.
+const LONGEST_FIRST_LOOK: Duration = Duration::from_millis(400);
 
 /// How often pages that are being loaded are looked for, while there is nothing else to do.
 const LOOK_FOR_PAGES: Duration = Duration::from_millis(4);
@@ -61,6 +68,8 @@ pub(crate) struct Stage {
     drawn: Option<Drawn>,
     /// The next frame shows something else than the last one.
     changed: bool,
+    /// Since when a model is there that has not been drawn yet.
+    fresh: Option<Instant>,
     /// Drawing is in vain until something changes.
     stuck: bool,
     /// The device is gone.
@@ -92,6 +101,7 @@ impl Stage {
             wish: None,
             drawn: None,
             changed: true,
+            fresh: None,
             stuck: false,
             lost: false,
             most_splats: u64::MAX,
@@ -108,7 +118,7 @@ impl Stage {
             let wait = if rests {
                 self.take_pictures();
                 None
-            } else if !self.changed && self.waits_for_pages() {
+            } else if self.fresh.is_some() || !self.changed && self.waits_for_pages() {
                 Some(LOOK_FOR_PAGES)
             } else {
                 Some(Duration::ZERO)
@@ -171,6 +181,7 @@ impl Stage {
                 let file = self.scene.residency_mut().add(file);
                 let ids = placements.into_iter().map(|placement| self.scene.add(Instance { file, placement }));
                 self.instances.insert(key, ids.collect());
+                self.fresh = Some(Instant::now());
             }
             Order::Remove(key) => {
                 for id in self.instances.remove(&key).unwrap_or_default() {
@@ -212,6 +223,12 @@ impl Stage {
             }
         };
         let select_ms = begun.elapsed().as_secs_f64() * 1e3;
+        let is_coming = report.limited_by == Some(Limit::Residency) && report.max_error_px > FIRST_ERROR_PX;
+        if is_coming && self.fresh.is_some_and(|since| since.elapsed() < LONGEST_FIRST_LOOK) {
+            self.scene.serve();
+            return;
+        }
+        self.fresh = None;
         let misses = self.scene.draws(CAMERA).map(|(_, selection)| selection.requests.len() as u64).sum();
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();

@@ -85,6 +85,25 @@ impl Staged {
 }
 
 #[test]
+fn the_first_look_at_a_model_waits_for_its_pages_but_not_for_long() {
+    let Some(gpu) = gpu() else { return };
+    let begun = Instant::now();
+    let staged = Staged::on(gpu);
+    staged.mailbox.wish(1, staged.wish(20.0));
+    let first = loop {
+        if let Some(first) = staged.mailbox.collect().figures.into_iter().next() {
+            break first;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(60), "it never came to be so");
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    // The root alone is as large as the picture.
+    assert!(first.report.max_error_px <= 40.0 || begun.elapsed() > Duration::from_millis(400), "{first:?}");
+    staged.mailbox.close();
+    staged.thread.join().unwrap();
+}
+
+#[test]
 fn a_picture_is_as_fine_as_it_gets_whatever_is_wished_for_meanwhile() {
     let Some(gpu) = gpu() else { return };
     let staged = Staged::on(gpu);

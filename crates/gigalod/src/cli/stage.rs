@@ -10,7 +10,7 @@ use gigalod_render::{Frame, Gpu, Lighting, Look, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::scene::description::SceneDescription;
 use gigalod_runtime::splats::Tint;
-use gigalod_runtime::{CutReport, FileId, Fineness, FrameRate, Instance, Magnified, Residency, Scene, ViewId};
+use gigalod_runtime::{CutReport, FileId, Fineness, FrameRate, Instance, Limit, Magnified, Residency, Scene, ViewId};
 use std::path::Path;
 use std::time::Instant;
 
@@ -30,6 +30,8 @@ pub(crate) struct Stage {
     /// Draws larger pixels where full ones would be late.
     pub(crate) control: Option<FrameRate>,
     up: UpAxis,
+    /// Bytes for pages and lists.
+    cpu_budget: u64,
     /// What a device without enough memory has left.
     most_splats: u64,
     happened: Vec<String>,
@@ -82,7 +84,15 @@ impl Stage {
         }
         let mut renderer = Gpu::open().and_then(Renderer::new).map_err(graphics_error)?;
         renderer.set_budget(budgets.gpu);
-        Ok(Self { scene, renderer, control: None, up, most_splats: u64::MAX, happened: Vec::new() })
+        Ok(Self {
+            scene,
+            renderer,
+            control: None,
+            up,
+            cpu_budget: budgets.cpu,
+            most_splats: u64::MAX,
+            happened: Vec::new(),
+        })
     }
 
     /// Around all models.
@@ -114,6 +124,7 @@ impl Stage {
             if wait == Wait::Converged {
                 // Then once more with everything there: the time that a warm cut takes.
                 self.scene.select_converged(CAMERA, camera, &fineness);
+                self.expect_all_models()?;
             }
             let begun = Instant::now();
             self.scene.residency_mut().receive(false);
@@ -143,6 +154,18 @@ impl Stage {
                 Err(error) => return Err(graphics_error(error)),
             }
         }
+    }
+
+    /// After a cut that has waited for its pages: a model that is not drawn at all, for want of memory, is an error.
+    fn expect_all_models(&self) -> Result<(), CliError> {
+        let is_missing = |report: &CutReport| report.drawn == 0 && report.limited_by == Some(Limit::Residency);
+        let is_damaged = self.scene.residency().damaged().next().is_some();
+        if is_damaged || !self.scene.draws(CAMERA).any(|(_, drawn)| is_missing(&drawn.report)) {
+            return Ok(());
+        }
+        let least = self.scene.least_bytes();
+        let text = format!("the coarsest picture needs {least} bytes of memory, expected at most {}", self.cpu_budget);
+        Err(CliError::new(text).hint("give a larger --cpu-budget"))
     }
 
     /// Something went wrong and was put right.
@@ -199,6 +222,7 @@ impl DrawArgs {
 /// What was drawn, in words.
 pub(crate) fn primitives(triangles: f64, points: f64) -> String {
     match triangles {
+        0.0 if points == 0.0 => "nothing".into(),
         0.0 => format!("{points:.0} splats"),
         _ => format!("{triangles:.0} triangles, {points:.0} points"),
     }

@@ -274,6 +274,11 @@ impl Residency {
         (pages + lists) as u64
     }
 
+    /// Bytes that the first pages of all models take.
+    pub fn first_pages_bytes(&self) -> u64 {
+        self.files.iter().map(|pages| pages.file.bytes_to_come(PageNumber(0))).sum()
+    }
+
     /// Bytes of all resident pages.
     pub fn resident_bytes(&self) -> u64 {
         self.resident_bytes

@@ -165,6 +165,11 @@ impl Scene {
         self.list_bytes() + self.search.bytes() + requests + self.residency.directory_bytes()
     }
 
+    /// A budget with which every model is drawn, as coarsely as can be.
+    pub fn least_bytes(&self) -> u64 {
+        self.residency.first_pages_bytes() + self.bytes_besides_pages() + LEAST_GROWTH_BYTES
+    }
+
     /// What lists may take together.
     fn most_list_bytes(&self) -> u64 {
         self.cpu_budget / 2
