@@ -133,12 +133,7 @@ pub(crate) fn build(
 ) -> Result<Report, CliError> {
     let side = SideLog::default();
     let (stream, identity) = inputs.open(sense, &side, console)?;
-    let representation = match options.representation {
-        Representation::Splats => Kind::Splats,
-        Representation::Hybrid => Kind::Hybrid,
-        Representation::Auto if suits_hybrid(&*stream, options) => Kind::Hybrid,
-        Representation::Auto => Kind::Splats,
-    };
+    let representation = representation(&*stream, options);
     let is_auto = options.representation == Representation::Auto;
     let is_known = stream.declared_faces().is_some();
     let options = Options {
@@ -185,6 +180,16 @@ pub(crate) fn build(
     warn_of_libraries(&side, console);
     cache::remember(inputs, output, &side)?;
     Ok(built)
+}
+
+/// What a model is built as, as far as its beginning says.
+pub(super) fn representation(stream: &dyn ModelStream, options: &BuildOptions) -> Kind {
+    match options.representation {
+        Representation::Splats => Kind::Splats,
+        Representation::Hybrid => Kind::Hybrid,
+        Representation::Auto if suits_hybrid(stream, options) => Kind::Hybrid,
+        Representation::Auto => Kind::Splats,
+    }
 }
 
 /// A mesh whose colours, if any, are its vertices'. What materials say of triangles, splats sample, as finely as `--spacing` says.

@@ -10,7 +10,6 @@ use super::exact;
 use super::files;
 use super::path_file;
 use super::scene_file;
-use super::view_preview::Extent;
 use super::{view_folder, view_preview};
 use gigalod_geom::{CameraPath, ImageSize};
 use gigalod_runtime::Similarity;
@@ -153,7 +152,7 @@ impl Files {
             let preview = scope.spawn(|| {
                 let is_late = || work.is_cancelled() || is_built.load(Ordering::Relaxed);
                 // What is wrong with the file is told by the build.
-                if let Ok(Some((file, points))) = view_preview::of(path, Extent::USUAL, &is_late)
+                if let Ok(Some((file, points))) = view_preview::of(path, &self.build, &is_late)
                     && !is_late()
                 {
                     let (source, placements) = (path.to_owned(), placements.to_vec());

@@ -4,11 +4,13 @@
 //! Goes in: a raw model, read once from front to back, a mesh no farther than its vertices. Comes out: a small model of its own, built
 //! as a cloud of points, in memory. How far it is from the model is not known.
 
+use super::args::BuildOptions;
+use super::build;
 use super::error::CliError;
 use super::files;
 use gigalod_build::NoProgress;
 use gigalod_format::splats::SplatFile;
-use gigalod_format::{Container, MemoryStore};
+use gigalod_format::{Container, Kind, MemoryStore};
 use gigalod_geom::LengthUnit;
 use gigalod_geom::camera::UpAxis;
 use gigalod_import::{Attributes, Batch, ImportError, ModelStream, VertexBatch};
@@ -17,7 +19,7 @@ use std::sync::Arc;
 
 /// Which models have previews, and of how many points.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Extent {
+struct Extent {
     /// Of the model.
     least_vertices: u64,
     /// Of the preview; it has half as many at least.
@@ -25,8 +27,11 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// What has fewer vertices is built as soon as a preview would be.
-    pub(crate) const USUAL: Self = Self { least_vertices: 1_000_000, most_points: 200_000 };
+    /// Of a model that is built as that: what has fewer vertices is built as soon as a preview would be.
+    fn of(kind: Kind) -> Self {
+        let least_vertices = if kind == Kind::Hybrid { 100_000 } else { 1_000_000 };
+        Self { least_vertices, most_points: 200_000 }
+    }
 }
 
 /// Memory of the build.
@@ -35,10 +40,20 @@ const MEMORY_BYTES: u64 = 128 << 20;
 /// A preview, and of how many points it is; `None` for small models, and when `is_cancelled`.
 pub(crate) fn of(
     path: &Path,
-    extent: Extent,
+    options: &BuildOptions,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Option<(SplatFile, u64)>, CliError> {
     let stream = files::open_model(path)?;
+    let extent = Extent::of(build::representation(&*stream, options));
+    with_extent(path, stream, extent, is_cancelled)
+}
+
+fn with_extent(
+    path: &Path,
+    stream: Box<dyn ModelStream>,
+    extent: Extent,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<(SplatFile, u64)>, CliError> {
     let Some(points) = sample(stream, extent, is_cancelled).map_err(|error| CliError::import(path, &error))? else {
         return Ok(None);
     };
@@ -161,10 +176,13 @@ mod tests {
         };
         let extent = Extent { least_vertices: 20_000, most_points: 8_000 };
         write(20_000);
-        assert!(of(&scan, extent, &|| false).unwrap().is_none());
+        let previewed = |is_cancelled: &dyn Fn() -> bool| {
+            with_extent(&scan, files::open_model(&scan).unwrap(), extent, is_cancelled).unwrap()
+        };
+        assert!(previewed(&|| false).is_none());
         write(60_000);
-        assert!(of(&scan, extent, &|| true).unwrap().is_none());
-        let (file, points) = of(&scan, extent, &|| false).unwrap().unwrap();
+        assert!(previewed(&|| true).is_none());
+        let (file, points) = previewed(&|| false).unwrap();
         assert!((4_000..=8_000).contains(&points), "{points}");
         let root = file.skeleton().root();
         let repeated = file.container().read_metadata().unwrap().repeated;
