@@ -92,7 +92,7 @@ impl Container {
         let magic = &header[..present.min(MAGIC.len())];
         if magic != MAGIC {
             return Err(FormatError::Magic {
-                found: format!("\"{}\"", magic.escape_ascii()),
+                found: if magic.is_empty() { "nothing".into() } else { format!("\"{}\"", magic.escape_ascii()) },
                 expected: format!("\"{}\"", MAGIC.escape_ascii()),
             });
         }

@@ -9,7 +9,7 @@ pub enum FormatError {
     /// Not a `.glod` file at all.
     #[error("not a .glod file: it begins with {found}, expected {expected}")]
     Magic {
-        /// First bytes of the file, escaped.
+        /// First bytes of the file, escaped; "nothing" of an empty one.
         found: String,
         /// The magic, escaped.
         expected: String,

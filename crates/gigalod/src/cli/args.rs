@@ -81,19 +81,19 @@ pub(crate) struct BuildOptions {
     /// Hybrid: the error of a node is at most the edge of its cell divided by this, 8 to 1024 [default: 64]
     ///
     /// Larger draws fewer primitives from afar, and takes more room on disk.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(8..=1024), value_name = "R")]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(8..=1024), allow_negative_numbers = true, value_name = "R")]
     pub(crate) res: Option<u32>,
     /// Hybrid: most triangles of a leaf, 64 to 65536 [default: 4096]
-    #[arg(long, value_parser = clap::value_parser!(u32).range(64..=65_536), value_name = "N")]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(64..=65_536), allow_negative_numbers = true, value_name = "N")]
     pub(crate) tmax: Option<u32>,
     /// Hybrid: bound errors of shading and colour too, or of geometry alone, which takes half the room
     #[arg(long, value_enum, default_value_t = Appearance::On)]
     pub(crate) appearance: Appearance,
     /// Most memory to use, as 512MiB or 4GB; at least 64MiB
-    #[arg(long, default_value = "2GiB", value_parser = parse::memory, value_name = "SIZE")]
+    #[arg(long, default_value = "2GiB", value_parser = parse::memory, allow_negative_numbers = true, value_name = "SIZE")]
     pub(crate) memory: u64,
     /// Worker threads; 0 for one on each core
-    #[arg(long, default_value = "0", value_parser = parse::threads, value_name = "N")]
+    #[arg(long, default_value = "0", value_parser = parse::threads, allow_negative_numbers = true, value_name = "N")]
     pub(crate) threads: usize,
     /// Sample triangles that are larger than this so finely, in the model's units [default: what suits the model]
     ///
@@ -195,7 +195,7 @@ pub(crate) struct RenderArgs {
 #[derive(Args, Debug)]
 pub(crate) struct DrawArgs {
     /// Width and height in pixels
-    #[arg(long, default_value = "1280x720", value_parser = parse::image_size, value_name = "WxH")]
+    #[arg(long, default_value = "1280x720", value_parser = parse::image_size, allow_hyphen_values = true, value_name = "WxH")]
     pub(crate) size: ImageSize,
     /// Largest error on screen, in pixels [default: 1, the diameter of splats; 0.5 where all models are hybrid]
     #[arg(long, value_parser = parse::positive, allow_hyphen_values = true, value_name = "PX")]
@@ -216,11 +216,11 @@ pub(crate) struct DrawArgs {
     #[arg(long)]
     pub(crate) lod_colors: bool,
     /// Most memory for the model: decoded pages, and lists of what is drawn
-    #[arg(long, default_value = "1GiB", value_parser = parse::size, value_name = "SIZE")]
+    #[arg(long, default_value = "1GiB", value_parser = parse::size, allow_negative_numbers = true, value_name = "SIZE")]
     pub(crate) cpu_budget: u64,
     /// Most memory on the graphics device, the picture included; where it does not suffice the model is drawn coarser [default:
     /// all there is]
-    #[arg(long, value_parser = parse::size, value_name = "SIZE")]
+    #[arg(long, value_parser = parse::size, allow_negative_numbers = true, value_name = "SIZE")]
     pub(crate) gpu_budget: Option<u64>,
 }
 
@@ -276,7 +276,7 @@ pub(crate) struct ViewArgs {
     #[arg(value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Milliseconds that a frame should take while the camera moves
-    #[arg(long, default_value = "50", value_parser = parse::positive, value_name = "MS")]
+    #[arg(long, default_value = "50", value_parser = parse::positive, allow_negative_numbers = true, value_name = "MS")]
     pub(crate) target_ms: f64,
     #[command(flatten)]
     pub(crate) draw: DrawArgs,
@@ -310,7 +310,7 @@ pub(crate) struct CameraArgs {
     #[arg(long, value_name = "PATH.json", conflicts_with = "eye", requires = "frame")]
     pub(crate) path: Option<PathBuf>,
     /// Which pose of the path, from 0
-    #[arg(long, value_name = "N", requires = "path")]
+    #[arg(long, allow_negative_numbers = true, value_name = "N", requires = "path")]
     pub(crate) frame: Option<usize>,
 }
 
@@ -414,10 +414,10 @@ pub(crate) enum SynthWhat {
 #[derive(Args, Debug)]
 pub(crate) struct StatueArgs {
     /// Number of triangles, met within 1 %
-    #[arg(long, value_parser = parse::count, default_value = "2M", value_name = "N")]
+    #[arg(long, value_parser = parse::count, default_value = "2M", allow_negative_numbers = true, value_name = "N")]
     pub(crate) triangles: u64,
     /// Another seed, another statue
-    #[arg(long, default_value_t = 1, value_name = "S")]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_name = "S")]
     pub(crate) seed: u64,
     /// Give each vertex a colour
     #[arg(long)]
@@ -435,10 +435,10 @@ pub(crate) struct ReplicateArgs {
     /// The scan to copy
     pub(crate) scan: PathBuf,
     /// Number of triangles, met within 1 %
-    #[arg(long, value_parser = parse::count, value_name = "N")]
+    #[arg(long, value_parser = parse::count, allow_negative_numbers = true, value_name = "N")]
     pub(crate) triangles: u64,
     /// Another seed, another heap
-    #[arg(long, default_value_t = 1, value_name = "S")]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_name = "S")]
     pub(crate) seed: u64,
     /// Order of vertices and triangles in the file
     #[arg(long, value_enum, default_value_t = OrderArg::Coherent)]
@@ -457,10 +457,10 @@ pub(crate) struct PathArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) around: PathBuf,
     /// Length in seconds, 30 poses each
-    #[arg(long, default_value = "10", value_parser = parse::seconds, value_name = "SECONDS")]
+    #[arg(long, default_value = "10", value_parser = parse::seconds, allow_negative_numbers = true, value_name = "SECONDS")]
     pub(crate) seconds: f64,
     /// Another seed, another path
-    #[arg(long, default_value_t = 1, value_name = "S")]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_name = "S")]
     pub(crate) seed: u64,
     /// File to write
     #[arg(short, long, value_name = "PATH.json")]
@@ -494,6 +494,6 @@ pub(crate) struct DemoArgs {
     #[arg(short, long, default_value = "demo", value_name = "FOLDER")]
     pub(crate) output: PathBuf,
     /// Number of triangles of the statue
-    #[arg(long, value_parser = parse::count, default_value = "2M", value_name = "N")]
+    #[arg(long, value_parser = parse::count, default_value = "2M", allow_negative_numbers = true, value_name = "N")]
     pub(crate) triangles: u64,
 }
