@@ -1,10 +1,11 @@
 //! How much each kernel shimmers while a camera moves slowly, beside a picture filtered as it should be.
 //!
-//! `cargo run --release --example shimmer -- MODEL.ply [ERROR_PX [splats|hybrid|geometry]]`
+//! `cargo run --release --example shimmer -- MODEL.ply [ERROR_PX [splats|hybrid|geometry [SAMPLES]]]`
 //!
 //! The camera moves by a tenth of a pixel a frame, to the right and forwards. Prints one JSON object: for each kernel its
 //! shimmer and its sharpness as multiples of those of a ray tracer with 16 rays a pixel, and the holes of its first frame.
 //! A kernel with less shimmer than that at less sharpness only blurs. Hybrid models have one; `geometry` is without appearance.
+//! SAMPLES: at how many places each pixel is looked at; 1 where it is not said.
 
 use anyhow::{Context, Result};
 use gigalod::build::{NoProgress, Options, hybrid, splats};
@@ -30,11 +31,12 @@ const STEP_PX: f64 = 0.1;
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, rest @ ..] = &arguments[..] else {
-        anyhow::bail!("usage: shimmer MODEL.ply [ERROR_PX [splats|hybrid|geometry]]");
+        anyhow::bail!("usage: shimmer MODEL.ply [ERROR_PX [splats|hybrid|geometry [SAMPLES]]]");
     };
     let threshold_px: f32 = rest.first().map_or(Ok(1.0), |text| text.parse())?;
     let mesh = read(Path::new(model))?;
     let kind = rest.get(1).map_or("splats", String::as_str);
+    let samples: u32 = rest.get(2).map_or(Ok(1), |text| text.parse())?;
     let mut scene = open(Path::new(model), kind)?;
     let mut renderer = Renderer::new(Gpu::open()?)?;
 
@@ -54,10 +56,11 @@ fn main() -> Result<()> {
         let pictures = cameras
             .iter()
             .map(|camera| {
-                let report = scene.select_converged(ViewId(0), camera, &Fineness::px(threshold_px));
+                let report = scene.select_converged(ViewId(0), &camera.with_margin(1), &Fineness::px(threshold_px));
                 let draws =
                     scene.draws(ViewId(0)).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-                let frame = Frame { camera: *camera, look: Look { kernel, ..Look::default() }, draws };
+                let look = Look { kernel, samples, ..Look::default() };
+                let frame = Frame { camera: *camera, look, draws };
                 let drawn = renderer.picture(&frame)?;
                 let pixels = drawn.rgba.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
                 first.get_or_insert((report, drawn));
@@ -90,7 +93,10 @@ fn main() -> Result<()> {
             "psnr_db": metrics::psnr_db(&filtered[0], &traced[0], Some(&mask)),
         }),
     );
-    println!("{}", serde_json::json!({ "model": model, "threshold_px": threshold_px, "kernels": kernels }));
+    println!(
+        "{}",
+        serde_json::json!({ "model": model, "threshold_px": threshold_px, "samples": samples, "kernels": kernels })
+    );
     Ok(())
 }
 

@@ -230,13 +230,17 @@ fn a_rested_picture_is_that_of_render_on_the_screen_and_in_a_file() {
     let fov = figures["fov"].to_string();
     let (eye, target) = (numbers(&figures["eye"]), numbers(&figures["target"]));
     let size = format!("{WIDTH}x{HEIGHT}");
-    run!["render", statue().glod, "-o", drawn, "--eye", eye, "--target", target, "--fov", fov, "--size", size].done();
+    let samples = figures["samples"].to_string();
+    assert_eq!(samples, "17", "edges are smooth at rest");
+    let (glod, view) = (&statue().glod, ["--eye", &eye, "--target", &target, "--fov", &fov, "--size", &size]);
+    let arguments = ["render", glod.to_str().unwrap(), "-o", drawn.to_str().unwrap(), "--samples", &samples];
+    cli_support::gigalod(arguments.into_iter().chain(view)).done();
     assert!(std::fs::read(&drawn).unwrap() == std::fs::read(&second).unwrap(), "the same bytes");
     assert!(figures["settled"] == Value::Bool(true) && figures["threshold_px"] == 1.0, "{figures}");
     assert_eq!(
         shape(&figures),
         "{adapter bytes_read driver_cpu_ms{max median p99} eye[] first_frame_ms fov frames height input_to_frame_ms{max median p99} limited_by \
-         max_error_px measured problems[] rest_to_settled_ms settled splats stage_cpu_ms{max median p99} target[] \
+         max_error_px measured problems[] rest_to_settled_ms samples settled splats stage_cpu_ms{max median p99} target[] \
          threshold_px up[] width window_cpu_ms{max median p99} written[]}"
     );
 }

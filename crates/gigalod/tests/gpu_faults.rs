@@ -61,7 +61,7 @@ fn a_budget_is_kept_or_the_frame_refused() {
         let budget = 40 << 20;
         assert!(free > budget, "{free}");
         renderer.set_budget(Some(budget));
-        let most = renderer.most_splats(size, kernel);
+        let most = renderer.most_splats(size, &Look { kernel, ..Look::default() });
         assert!((50_000..2_000_000).contains(&most), "{most}");
         // A smaller budget leaves fewer rows of keys at a time; the picture is the same.
         assert!(same(&renderer.picture(&frame(&source, kernel, size)).unwrap(), &expected), "{kernel:?}");
@@ -82,7 +82,7 @@ fn a_budget_is_kept_or_the_frame_refused() {
         ));
         assert!(same(&renderer.picture(&frame(&source, kernel, size)).unwrap(), &expected), "a refusal costs nothing");
         renderer.set_budget(Some(8 << 20));
-        assert_eq!(renderer.most_splats(size, kernel), 0);
+        assert_eq!(renderer.most_splats(size, &Look { kernel, ..Look::default() }), 0);
         assert!(matches!(renderer.draw(&frame(&source, kernel, size)), Err(RenderError::Budget { .. })));
     }
 }

@@ -40,6 +40,12 @@ pub enum RenderError {
     /// The kernel cannot be drawn by the depth test alone, and this device can do no more.
     #[error("the graphics device cannot blend splats: it has no storage buffers to write to")]
     CannotBlend,
+    /// Asked for too many places in a pixel, or none.
+    #[error("{0} samples of a pixel, expected 1 to {most}", most = crate::MOST_SAMPLES)]
+    Samples(u32),
+    /// Pictures are added up in half floats, and this device cannot add to them.
+    #[error("the graphics device cannot smooth edges: it cannot add half floats up")]
+    CannotSmooth,
     /// The device had not the memory. The renderer has freed what it kept and can be used: draw coarser.
     #[error("the graphics device is out of memory: {0}")]
     OutOfMemory(String),

@@ -3,18 +3,27 @@
 //! Goes in: a [`Frame`]. Comes out: its lists by kind, checked.
 
 use crate::splats::Kernel;
-use crate::{Gpu, GpuLevel, Lighting, RenderError};
+use crate::{Gpu, GpuLevel, Lighting, RenderError, smooth};
 use gigalod_geom::Camera;
 use gigalod_runtime::hybrid::HybridList;
 use gigalod_runtime::{DrawSource, ModelView, Similarity, SplatList};
 
 /// How things are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Shape of splats.
     pub kernel: Kernel,
     /// Light and background.
     pub lighting: Lighting,
+    /// At how many places each pixel is looked at, 1 to [`crate::MOST_SAMPLES`]: a frame takes as many times as long, and its edges are as
+    /// much smoother. Depths are those of the pixels' middles. What is drawn is to be cut for a picture a pixel larger all around.
+    pub samples: u32,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { kernel: Kernel::default(), lighting: Lighting::default(), samples: 1 }
+    }
 }
 
 /// What a frame draws, from where.
@@ -40,7 +49,7 @@ impl<'a> Lists<'a> {
     ///
     /// # Errors
     /// [`RenderError::Size`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`], [`RenderError::NeedsStorage`],
-    /// [`RenderError::TooMany`].
+    /// [`RenderError::TooMany`], [`RenderError::Samples`], [`RenderError::CannotSmooth`].
     pub(crate) fn of(gpu: &Gpu, frame: &Frame<'a>) -> Result<Self, RenderError> {
         let (size, limit) = (frame.camera.size, gpu.max_picture_edge());
         if size.width.min(size.height) == 0 || size.width.max(size.height) > limit {
@@ -49,6 +58,7 @@ impl<'a> Lists<'a> {
         if gpu.level() == GpuLevel::WebGl && frame.look.kernel.is_gauss() {
             return Err(RenderError::CannotBlend);
         }
+        smooth::check(gpu, frame.look.samples)?;
         let mut lists = Self::default();
         for (placement, source) in &frame.draws {
             match source {

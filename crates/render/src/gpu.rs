@@ -49,6 +49,7 @@ pub struct Gpu {
     level: GpuLevel,
     /// A texture can be looked at in another format than its own.
     pub(crate) has_view_formats: bool,
+    can_add: bool,
     faults: Arc<Mutex<Faults>>,
 }
 
@@ -128,7 +129,10 @@ impl Gpu {
             keep_lost.lock().expect("nobody panics while holding it").lost.get_or_insert(why);
         });
         let has_view_formats = adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS);
-        Ok(Self { device, queue, info: adapter.get_info(), wanted, level, has_view_formats, faults })
+        let sum = adapter.get_texture_format_features(crate::smooth::SUM);
+        let can_add = sum.allowed_usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
+            && sum.flags.contains(wgpu::TextureFormatFeatureFlags::BLENDABLE);
+        Ok(Self { device, queue, info: adapter.get_info(), wanted, level, has_view_formats, can_add, faults })
     }
 
     /// Name of the adapter, and through which interface it is driven.
@@ -154,6 +158,11 @@ impl Gpu {
     /// True where the host's processor does the drawing.
     pub(crate) fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// True where pictures can be added up, for smooth edges.
+    pub(crate) fn can_add(&self) -> bool {
+        self.can_add
     }
 
     /// Longest edge of a picture, in pixels.

@@ -21,6 +21,7 @@ mod renderer;
 #[cfg(test)]
 mod renderer_tests;
 mod shader;
+mod smooth;
 mod splats;
 mod staging;
 mod targets;
@@ -32,5 +33,6 @@ pub use frame::{Frame, Look};
 pub use gpu::{Gpu, GpuLevel};
 pub use light::Lighting;
 pub use renderer::Renderer;
+pub use smooth::MOST_SAMPLES;
 pub use splats::Kernel;
 pub use targets::Picture;

@@ -4,6 +4,7 @@ use crate::gbuffer::{self, GBuffer};
 use crate::memory::Pool;
 use crate::shader::{self, Target};
 use crate::splats::params::four;
+use crate::{Gpu, smooth};
 use gigalod_geom::Camera;
 use gigalod_geom::color::LINEAR_OF_SRGB8;
 use glam::DVec3;
@@ -45,20 +46,28 @@ pub(crate) struct LightParams {
     light: [f32; 4],
     /// Linear light; alpha 1.
     background: [f32; 4],
-    size_px: [f32; 2],
+    middle_px: [f32; 2],
     focal_px: f32,
     ambient: f32,
+    /// What this picture is of a sum of several.
+    share: f32,
+    pad_a: f32,
+    pad_b: f32,
+    pad_c: f32,
 }
 
 /// Lights a G-buffer.
 #[derive(Debug)]
 pub(crate) struct LightPass {
     pipeline: wgpu::RenderPipeline,
+    /// Adds to a sum; where the device can.
+    adding: Option<wgpu::RenderPipeline>,
     layout: wgpu::BindGroupLayout,
 }
 
 impl LightPass {
-    pub(crate) fn new(device: &wgpu::Device) -> Self {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let device = &gpu.device;
         let module = shader::module(device, "light.wgsl", SOURCE, Target::None);
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
@@ -92,32 +101,36 @@ impl LightPass {
             bind_group_layouts: &[Some(&layout)],
             immediate_size: 0,
         });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("light"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cover_picture"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("light"),
-                compilation_options: Default::default(),
-                targets: &[Some(PICTURE.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        Self { pipeline, layout }
+        let pipeline_to = |target: wgpu::ColorTargetState| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("light"),
+                layout: Some(&pipeline_layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("cover_picture"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: Default::default(),
+                depth_stencil: None,
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some("light"),
+                    compilation_options: Default::default(),
+                    targets: &[Some(target)],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let sum = wgpu::ColorTargetState { blend: Some(smooth::ADD), ..smooth::SUM.into() };
+        let adding = gpu.can_add().then(|| pipeline_to(sum));
+        Self { pipeline: pipeline_to(PICTURE.into()), adding, layout }
     }
 
     /// What its uniform buffer holds.
-    pub(crate) fn params(camera: &Camera, lighting: &Lighting) -> LightParams {
+    pub(crate) fn params(camera: &Camera, lighting: &Lighting, middle_px: [f32; 2], share: f32) -> LightParams {
         let linear = |srgb: [u8; 3]| {
             let [r, g, b] = srgb.map(|value| LINEAR_OF_SRGB8[usize::from(value)]);
             [r, g, b, 1.0]
@@ -130,9 +143,13 @@ impl LightPass {
             towards_light: four(towards.unwrap_or(camera.shoulder_light())),
             light: [1.0; 4],
             background: linear(lighting.background),
-            size_px: [camera.size.width as f32, camera.size.height as f32],
+            middle_px,
             focal_px: camera.focal_px() as f32,
             ambient: AMBIENT,
+            share,
+            pad_a: 0.0,
+            pad_b: 0.0,
+            pad_c: 0.0,
         }
     }
 
@@ -151,8 +168,10 @@ impl LightPass {
         })
     }
 
-    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, bind_group: &wgpu::BindGroup) {
-        pass.set_pipeline(&self.pipeline);
+    /// Into a picture, or to be added to a sum.
+    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, bind_group: &wgpu::BindGroup, adds: bool) {
+        let adding = self.adding.as_ref().filter(|_| adds);
+        pass.set_pipeline(adding.unwrap_or(&self.pipeline));
         pass.set_bind_group(0, bind_group, &[]);
         pass.draw(0..3, 0..1);
     }
@@ -167,7 +186,21 @@ mod tests {
         shader::assert_same_layout!(
             LightParams,
             SOURCE,
-            [right, up, forward, towards_light, light, background, size_px, focal_px, ambient]
+            [
+                right,
+                up,
+                forward,
+                towards_light,
+                light,
+                background,
+                middle_px,
+                focal_px,
+                ambient,
+                share,
+                pad_a,
+                pad_b,
+                pad_c
+            ]
         );
     }
 }

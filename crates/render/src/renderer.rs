@@ -5,24 +5,24 @@
 //! again, at the latest after [`Renderer::recover`].
 
 mod capacity;
+mod sampled;
 
 use crate::buffers::Buffers;
-use crate::commands::Commands;
 use crate::frame::{Frame, Lists};
 use crate::hybrid;
 use crate::hybrid::arena::{self, Arena};
-use crate::hybrid::keyed::{HybridFrame, HybridPass};
+use crate::hybrid::keyed::HybridPass;
 use crate::light::LightPass;
+use crate::smooth::{self, SmoothPass};
 use crate::splats::Kernel;
-use crate::splats::depth_test::{self, DepthTestFrame, DepthTestPass};
-use crate::splats::keyed::{self, Bands, KeyedFrame, KeyedPass};
-use crate::splats::pipelines::{Resolving, Round};
+use crate::splats::depth_test::DepthTestPass;
+use crate::splats::keyed::{self, KeyedPass};
 use crate::splats::store::{self, Plan};
 use crate::staging::Staging;
 use crate::targets::Targets;
-use crate::{Gpu, GpuLevel, Picture, RenderError, gbuffer, memory};
-use gigalod_geom::ImageSize;
+use crate::{Gpu, GpuLevel, Picture, RenderError, memory};
 use gigalod_runtime::Interrupt;
+use sampled::OnDevice;
 
 /// Draws frames; keeps pipelines, targets and buffers between them.
 #[derive(Debug)]
@@ -33,6 +33,8 @@ pub struct Renderer {
     hybrid_pass: HybridPass,
     arena: Arena,
     light_pass: LightPass,
+    /// Compiled when it is first needed.
+    smooth_pass: Option<SmoothPass>,
     budget: Option<u64>,
     compute_extent_px: u32,
     hybrid_extent_px: u32,
@@ -43,25 +45,13 @@ pub struct Renderer {
     last: Option<OnDevice>,
 }
 
-/// A frame that lies on the device, ready to be drawn.
-#[derive(Debug)]
-struct OnDevice {
-    kernel: Kernel,
-    rounds: &'static [Round],
-    resolving: Resolving,
-    bands: Bands,
-    plan: Plan,
-    hybrid: hybrid::plan::Plan,
-    hybrid_bands: Bands,
-}
-
 impl Renderer {
     /// Compiles what every frame needs. Passes of a kernel are compiled when it is first drawn.
     ///
     /// # Errors
     /// [`RenderError::Device`], [`RenderError::OutOfMemory`] and [`RenderError::DeviceLost`].
     pub fn new(gpu: Gpu) -> Result<Self, RenderError> {
-        let light_pass = LightPass::new(&gpu.device);
+        let light_pass = LightPass::new(&gpu);
         let staging = Staging::new(&gpu);
         let compute_extent_px = keyed::compute_extent_px(&gpu);
         let hybrid_extent_px = hybrid::keyed::compute_extent_px(&gpu);
@@ -73,6 +63,7 @@ impl Renderer {
             hybrid_pass: HybridPass::default(),
             arena: Arena::default(),
             light_pass,
+            smooth_pass: None,
             budget: None,
             compute_extent_px,
             hybrid_extent_px,
@@ -91,7 +82,7 @@ impl Renderer {
 
     /// Bytes that are taken on the device: targets, and all buffers that are kept.
     pub fn gpu_bytes(&self) -> u64 {
-        let targets = self.targets.as_ref().map_or(0, |targets| Targets::bytes(targets.gbuffer.size));
+        let targets = self.targets.as_ref().map_or(0, Targets::own_bytes);
         Staging::BYTES + targets + self.buffers.bytes()
     }
 
@@ -136,8 +127,8 @@ impl Renderer {
     /// Draws a frame and waits until the device is done. The picture stays there.
     ///
     /// # Errors
-    /// [`RenderError::Size`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`], [`RenderError::NeedsStorage`],
-    /// [`RenderError::TooMany`] and [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
+    /// [`RenderError::Size`], [`RenderError::Samples`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`],
+    /// [`RenderError::CannotSmooth`], [`RenderError::NeedsStorage`], [`RenderError::TooMany`] and [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
     /// [`RenderError::DeviceLost`]: [`Renderer::recover`].
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), RenderError> {
         self.submit(frame, false, None)?;
@@ -216,104 +207,56 @@ impl Renderer {
         let (camera, kernel) = (&frame.camera, frame.look.kernel);
         let most = store::most_in_chunk(&self.gpu);
         let area_px = lists.splat_area_px(camera);
-        let plan = Plan::new(camera, &lists.splats, most, keyed::most_in_slice(lists.splat_count(), area_px));
-        let bands = self.bands(camera.size, kernel);
-        let keyed = self.gpu.level() > GpuLevel::WebGl;
-        let passes = if keyed {
-            keyed::pass_bytes(&self.gpu, camera, kernel, &bands, &plan, self.compute_extent_px, read_back)
-        } else {
-            depth_test::pass_bytes(camera)
+        let sent = OnDevice {
+            camera: *camera,
+            look: frame.look,
+            rounds: keyed::rounds(&self.gpu, camera.size, kernel, area_px),
+            bands: self.bands(camera.size, kernel),
+            plan: Plan::new(camera, &lists.splats, most, keyed::most_in_slice(lists.splat_count(), area_px)),
+            hybrid: hybrid::plan::Plan::new(camera, &lists.hybrid, hybrid::plan::most_runs(&self.gpu))?,
+            hybrid_bands: self.bands(camera.size, Kernel::Round),
+            read_back,
         };
-        self.buffers.want(passes.len() as u64, &plan);
-        if keyed {
-            self.buffers.keyed.want(&bands, kernel, plan.largest_chunk());
-        }
-        let hybrid_bands = self.bands(camera.size, Kernel::Round);
-        let hybrid = hybrid::plan::Plan::new(camera, &lists.hybrid, hybrid::plan::most_runs(&self.gpu))?;
-        let hybrid_passes = hybrid::keyed::pass_bytes(&self.gpu, camera, &hybrid_bands, &hybrid, self.hybrid_extent_px);
+        let first = self.aimed_at(&sent, smooth::middle_px(camera));
         let pages = arena::needed_bytes(lists.hybrid.iter().map(|(_, list)| *list));
         let most_page_bytes = arena::most_bytes(&self.gpu);
         if pages > most_page_bytes {
             return Err(RenderError::Budget { needed: pages, budget: most_page_bytes });
         }
-        if !hybrid.is_empty() {
-            let Buffers { keyed, hybrid: buffers, .. } = &mut self.buffers;
-            buffers.want(keyed, &self.gpu, &hybrid_bands, &hybrid, hybrid_passes.len() as u64)?;
+        self.buffers.want(first.passes.len() as u64, &sent.plan);
+        if self.gpu.level() > GpuLevel::WebGl {
+            self.buffers.keyed.want(&sent.bands, kernel, sent.plan.largest_chunk());
         }
-        self.make_room(camera.size, pages, read_back)?;
+        if !sent.hybrid.is_empty() {
+            let Buffers { keyed, hybrid: buffers, .. } = &mut self.buffers;
+            buffers.want(keyed, &self.gpu, &sent.hybrid_bands, &sent.hybrid, first.hybrid_passes.len() as u64)?;
+        }
+        self.make_room(&sent, pages)?;
         let Self { gpu, staging, buffers, arena, uploaded_bytes, .. } = self;
         if !store::upload(gpu, staging, &buffers.chunks, most, &lists.splats, interrupt)?
             || !arena.place(gpu, staging, &buffers.hybrid.pages, &lists.hybrid, interrupt)?
         {
             return Ok(false);
         }
-        staging.write(gpu, buffers.passes.buffer(), 0, &passes)?;
-        staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&plan.parts))?;
-        if !hybrid.is_empty() {
+        staging.write(gpu, buffers.parts.buffer(), 0, bytemuck::cast_slice(&sent.plan.parts))?;
+        if !sent.hybrid.is_empty() {
             let nodes = hybrid::plan::Plan::node_params(camera, &lists.hybrid, arena);
-            buffers.hybrid.send(gpu, staging, &nodes, &hybrid.runs, &hybrid_passes)?;
+            buffers.hybrid.send(gpu, staging, &nodes, &sent.hybrid.runs)?;
         }
-        let light = LightPass::params(camera, &frame.look.lighting);
-        staging.write(gpu, buffers.light.buffer(), 0, bytemuck::bytes_of(&light))?;
-        staging.finish(gpu)?;
+        first.send(gpu, staging, buffers)?;
         *uploaded_bytes = staging.take_written_bytes();
-        let rounds = keyed::rounds(gpu, camera.size, kernel, area_px);
-        let resolving = Resolving { is_shared: plan.is_shared(), footprint: read_back };
-        self.last = Some(OnDevice { kernel, rounds, resolving, bands, plan, hybrid, hybrid_bands });
+        self.last = Some(sent);
         Ok(true)
-    }
-
-    /// Draws what lies on the device. False where that was broken off.
-    fn submit_last(&mut self, interrupt: Option<&Interrupt>) -> Result<bool, RenderError> {
-        let Self { gpu, buffers: whole, targets, .. } = self;
-        let OnDevice { kernel, rounds, resolving, bands, plan, hybrid, hybrid_bands } =
-            self.last.as_ref().expect("just sent, or asked for");
-        let Targets { gbuffer, picture } = targets.as_ref().expect("made with the room");
-        let mut commands = Commands::new(gpu, interrupt);
-        let chunks = &whole.chunks[..plan.chunks.len()];
-        let (kernel, resolving, passes, parts) = (*kernel, *resolving, &whole.passes, &whole.parts);
-        if chunks.is_empty() {
-            drop(gbuffer.begin(commands.encoder(), true));
-        } else if gpu.level() > GpuLevel::WebGl {
-            self.keyed_pass.prepare(gpu, kernel, resolving);
-            let (bands, buffers) = (*bands, &whole.keyed);
-            let keyed = KeyedFrame { kernel, rounds, resolving, bands, plan, chunks, passes, parts, buffers };
-            if !self.keyed_pass.encode(gpu, &mut commands, gbuffer, &keyed)? {
-                return Ok(false);
-            }
-        } else {
-            self.depth_test_pass.prepare(gpu, kernel);
-            let splats = DepthTestFrame { kernel, plan, chunks, passes, parts };
-            self.depth_test_pass.encode(gpu, commands.encoder(), gbuffer, &splats);
-        }
-        if !hybrid.is_empty() {
-            self.hybrid_pass.prepare(gpu, hybrid);
-            let Buffers { keyed: shared, hybrid: buffers, .. } = &*whole;
-            let frame = HybridFrame { bands: *hybrid_bands, plan: hybrid, buffers, shared };
-            if !self.hybrid_pass.encode(gpu, &mut commands, gbuffer, &frame)? {
-                return Ok(false);
-            }
-        }
-        let lit = self.light_pass.bind(&gpu.device, gbuffer, &whole.light);
-        {
-            let target = gbuffer::view(picture);
-            let mut pass = commands.encoder().begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("light"),
-                color_attachments: &[Some(gbuffer::attachment(&target, true, wgpu::Color::TRANSPARENT))],
-                ..Default::default()
-            });
-            self.light_pass.draw(&mut pass, &lit);
-        }
-        commands.submit().map(|()| true)
     }
 
     /// Targets of this size, and buffers for a frame, of which all is wanted but the pages of nodes; within the budget, or with an
     /// error and nothing changed.
-    fn make_room(&mut self, size: ImageSize, page_bytes: u64, read_back: bool) -> Result<(), RenderError> {
-        if read_back {
+    fn make_room(&mut self, sent: &OnDevice, page_bytes: u64) -> Result<(), RenderError> {
+        let (size, samples) = (sent.camera.size, sent.look.samples);
+        if sent.read_back {
             self.buffers.want_readback(size);
         }
-        let other = Staging::BYTES + Targets::bytes(size);
+        let other = Staging::BYTES + Targets::bytes(size, samples);
         let stale = self.targets.take_if(|targets| targets.gbuffer.size != size);
         if let Some(targets) = stale {
             targets.free();
@@ -328,11 +271,8 @@ impl Renderer {
             }
         }
         fitted?;
-        if self.targets.is_none() {
-            self.targets = Some(Targets::new(&self.gpu, size));
-            self.gpu.check()?;
-        }
-        Ok(())
+        self.targets.get_or_insert_with(|| Targets::new(&self.gpu, size)).want_sum(&self.gpu, samples);
+        self.gpu.check()
     }
 
     /// After [`RenderError::OutOfMemory`] frees all that was kept, so that a coarser frame finds room.

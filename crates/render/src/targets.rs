@@ -7,7 +7,7 @@ use crate::gbuffer::GBuffer;
 use crate::light::PICTURE;
 use crate::memory::Pool;
 use crate::readback::read_texture;
-use crate::{Gpu, RenderError};
+use crate::{Gpu, RenderError, smooth};
 use gigalod_geom::ImageSize;
 
 /// A finished picture and what it was lit from, on the host; rows from the top.
@@ -28,6 +28,8 @@ pub struct Picture {
 pub(crate) struct Targets {
     pub(crate) gbuffer: GBuffer,
     pub(crate) picture: wgpu::Texture,
+    /// What several pictures add up to, for smooth edges.
+    pub(crate) sum: Option<wgpu::Texture>,
 }
 
 impl Targets {
@@ -36,17 +38,32 @@ impl Targets {
             | wgpu::TextureUsages::COPY_SRC
             | wgpu::TextureUsages::TEXTURE_BINDING;
         let picture = gpu.create_shown_texture("picture", size, PICTURE, usage);
-        Self { gbuffer: GBuffer::new(&gpu.device, size), picture }
+        Self { gbuffer: GBuffer::new(&gpu.device, size), picture, sum: None }
     }
 
     /// Bytes on the device.
-    pub(crate) fn bytes(size: ImageSize) -> u64 {
-        GBuffer::bytes(size) + size.pixels() as u64 * 4
+    pub(crate) fn bytes(size: ImageSize, samples: u32) -> u64 {
+        GBuffer::bytes(size) + size.pixels() as u64 * 4 + smooth::sum_bytes(size, samples)
+    }
+
+    /// Bytes that these take.
+    pub(crate) fn own_bytes(&self) -> u64 {
+        Self::bytes(self.gbuffer.size, if self.sum.is_some() { 2 } else { 1 })
+    }
+
+    /// Makes a sum where one is needed, and frees it where none is.
+    pub(crate) fn want_sum(&mut self, gpu: &Gpu, samples: u32) {
+        if samples == 1 {
+            self.sum.take().iter().for_each(wgpu::Texture::destroy);
+        } else if self.sum.is_none() {
+            self.sum = Some(smooth::create_sum(gpu, self.gbuffer.size));
+        }
     }
 
     /// Frees them at once; the picture when nobody shows it any more.
     pub(crate) fn free(self) {
         self.gbuffer.free();
+        self.sum.iter().for_each(wgpu::Texture::destroy);
     }
 
     /// Waits for the device, and brings what it drew to the host; `through` has room as [`crate::readback::buffer_bytes`] says.

@@ -55,7 +55,7 @@ fn pages_stay_on_the_device_within_the_budget_and_a_frame_beyond_it_is_refused()
     for share in [100u64, 80, 70, 60, 50, 40, 20] {
         let budget = comfort * share / 100;
         renderer.set_budget(Some(budget));
-        let fits = renderer.most_page_bytes(SIZE, Look::default().kernel) >= page_bytes;
+        let fits = renderer.most_page_bytes(SIZE, &Look::default()) >= page_bytes;
         let (drawn, _) = draw(&mut renderer, &[&large]);
         match drawn {
             Ok(drawn) => assert!(same(&drawn, &first) && renderer.gpu_bytes() <= budget),

@@ -37,6 +37,6 @@ mod window;
 pub use host::{Entry, Folder, Host, Kind, Model, Opened, OpenedScene, Preview, Progress, Work};
 pub use mailbox::Figures;
 pub use report::{Measured, Report, Tally, percentile};
-pub use settings::{FirstLook, Options, Settings};
+pub use settings::{FirstLook, Options, SAMPLES, Settings};
 pub use viewer::next_name;
 pub use window::{ViewError, run};

@@ -88,6 +88,8 @@ pub struct Figures {
     pub bytes_read: u64,
     /// Nothing gets finer any more.
     pub settled: bool,
+    /// Places at which each pixel was looked at.
+    pub samples: u32,
     /// Frames so far.
     pub frames: u64,
     /// What is wrong with files, as far as they were read.

@@ -101,6 +101,12 @@ impl Viewer {
                 .suffix(" ms");
             ui.add(slider).labelled_by(label.id);
             ui.end_row();
+            let label = ui
+                .label("Smooth edges")
+                .on_hover_text("Places at which each pixel is looked at, once all else is drawn");
+            let slider = Slider::new(&mut settings.samples, 1..=gigalod_render::MOST_SAMPLES).logarithmic(true);
+            ui.add(slider).labelled_by(label.id);
+            ui.end_row();
             let label = ui.label("Kernel");
             let chosen = egui::ComboBox::from_id_salt("kernel").selected_text(kernel_name(settings.kernel));
             let list = chosen.show_ui(ui, |ui| {

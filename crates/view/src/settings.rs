@@ -6,11 +6,16 @@ use gigalod_runtime::splats::Tint;
 use glam::DVec3;
 use std::path::PathBuf;
 
+/// Usual places at which each pixel is looked at: a square lattice.
+pub const SAMPLES: u32 = 17;
+
 /// How things are drawn, and with what.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Shape of splats.
     pub kernel: Kernel,
+    /// Places at which each pixel is looked at, once the picture is as fine as it gets.
+    pub samples: u32,
     /// World space; `None` for a lamp at the viewer's shoulder.
     pub towards_light: Option<DVec3>,
     /// 8-bit sRGB.
@@ -30,7 +35,7 @@ pub struct Settings {
 impl Settings {
     pub(crate) fn look(&self) -> Look {
         let lighting = Lighting { towards_light: self.towards_light, background: self.background };
-        Look { kernel: self.kernel, lighting }
+        Look { kernel: self.kernel, lighting, samples: self.samples }
     }
 }
 
@@ -38,6 +43,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             kernel: Kernel::Round,
+            samples: SAMPLES,
             towards_light: None,
             background: [32, 32, 36],
             tint: Tint::Model,

@@ -1,19 +1,20 @@
 //! The thread that selects, uploads and draws, so that the window's thread never does.
 //!
 //! Goes in: wishes and orders. Comes out: pictures on the device, and figures. While wishes change, each frame is as fine as its
-//! time allows; once they rest it is refined step by step, until a new wish comes: that breaks a cut off at once.
-//!
-//! Pictures for files are taken by [`pictures`].
+//! time allows; once they rest it is refined step by step, and last its edges are smoothed ([`smooth`]), until a new wish comes: that
+//! breaks everything off at once. Pictures for files are taken by [`pictures`].
 //!
 //! What always holds: a rested picture is that of `render` for the same camera, look and budgets, bit for bit; what goes wrong with
 //! files or the device is told and survived.
 
 mod pictures;
+mod smooth;
 
 use crate::clock::thread_cpu_ms;
 use crate::mailbox::{Figures, Mail, Mailbox, ModelKey, News, Order, Wish};
 use crate::settings::Settings;
-use gigalod_render::{Frame, RenderError, Renderer};
+use gigalod_geom::Camera;
+use gigalod_render::{Frame, Look, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::{
     CutReport, DrawSource, Fineness, FrameRate, Instance, InstanceId, Limit, Magnified, Residency, Scene, ViewId,
@@ -70,6 +71,8 @@ pub(crate) struct Stage {
     changed: bool,
     /// Since when a model is there that has not been drawn yet.
     fresh: Option<Instant>,
+    /// Edges are as smooth as they get.
+    is_smooth: bool,
     /// Drawing is in vain until something changes.
     stuck: bool,
     /// The device is gone.
@@ -81,6 +84,8 @@ pub(crate) struct Stage {
     /// To be taken.
     pictures: VecDeque<(PathBuf, Wish)>,
     frames: u64,
+    /// Of the last frame.
+    figures: Figures,
 }
 
 impl Stage {
@@ -102,19 +107,22 @@ impl Stage {
             drawn: None,
             changed: true,
             fresh: None,
+            is_smooth: false,
             stuck: false,
             lost: false,
             most_splats: u64::MAX,
             cut: None,
             pictures: VecDeque::new(),
             frames: 0,
+            figures: Figures::default(),
         })
     }
 
     /// Until the mailbox is closed.
     pub(crate) fn run(mut self) {
         loop {
-            let rests = self.wish.is_none() || self.lost || self.stuck || !self.changed && self.control.is_settled();
+            let is_refined = !self.changed && self.control.is_settled();
+            let rests = self.wish.is_none() || self.lost || self.stuck || is_refined && self.is_smooth;
             let wait = if rests {
                 self.take_pictures();
                 None
@@ -137,7 +145,11 @@ impl Stage {
                 self.obey(order);
             }
             let Some((number, wish)) = self.wish else { continue };
-            if self.lost || self.stuck || !self.changed && self.control.is_settled() {
+            if self.lost || self.stuck {
+                continue;
+            }
+            if !self.changed && self.control.is_settled() {
+                self.smooth(number, &wish);
                 continue;
             }
             if !self.changed && self.waits_for_pages() && self.scene.residency_mut().receive(false) == 0 {
@@ -203,18 +215,19 @@ impl Stage {
     fn frame(&mut self, number: u64, wish: &Wish) {
         let (begun, cpu_begun) = (Instant::now(), thread_cpu_ms());
         let moved = self.changed;
-        self.cut = None;
+        (self.cut, self.is_smooth) = (None, false);
+        let seen = seen(wish);
         self.control.share(self.painting_ms);
         let wanted = self.control.next(moved);
-        let room = self.renderer.most_splats(wish.camera.size, wish.look.kernel);
+        let room = self.renderer.most_splats(wish.camera.size, &wish.look);
         let fineness = Fineness { most_splats: wanted.most_splats.min(self.most_splats).min(room), ..wanted };
         self.scene.residency_mut().receive(false);
         let report = if moved {
             // A moving frame is short, and breaking it off would show nothing at all.
-            self.scene.select(CAMERA, &wish.camera, &fineness)
+            self.scene.select(CAMERA, &seen, &fineness)
         } else {
             let interrupt = self.mailbox.interrupt().clone();
-            match self.scene.select_interruptible(CAMERA, &wish.camera, &fineness, &interrupt) {
+            match self.scene.select_interruptible(CAMERA, &seen, &fineness, &interrupt) {
                 Some(report) => report,
                 None => {
                     self.scene.serve();
@@ -234,7 +247,8 @@ impl Stage {
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
         let pixel_edge_px = self.control.pixel_edge_px(&report, select_ms, self.scene.area_px(CAMERA, &wish.camera));
         let magnified = Magnified::new(&wish.camera, pixel_edge_px);
-        let frame = Frame { camera: *magnified.camera(), look: wish.look, draws };
+        let look = Look { samples: 1, ..wish.look };
+        let frame = Frame { camera: *magnified.camera(), look, draws };
         let typical_px = typical_px(&frame, wish.camera.focal_px());
         let waited = Instant::now();
         self.mailbox.wait_until_painted(LONGEST_PAINTING);
@@ -284,9 +298,11 @@ impl Stage {
             gpu_bytes: self.renderer.gpu_bytes(),
             bytes_read: self.scene.residency().bytes_read(),
             settled,
+            samples: 1,
             frames: self.frames,
             problems: self.problems(&report),
         };
+        self.figures = figures.clone();
         self.mailbox.show(self.renderer.shown(), figures);
     }
 
@@ -319,6 +335,11 @@ impl Stage {
         }
         problems
     }
+}
+
+/// What is cut for: what is looked at beside the middles of pixels may lie a little beside the picture.
+fn seen(wish: &Wish) -> Camera {
+    wish.camera.with_margin(u32::from(wish.look.samples > 1))
 }
 
 /// Median diameter of what is drawn, in pixels of the screen across the view axis, of a sample; 0 where nothing is.

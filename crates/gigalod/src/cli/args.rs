@@ -206,6 +206,10 @@ pub(crate) struct DrawArgs {
     /// Shape of splats
     #[arg(long, value_enum, default_value_t = KernelArg::Round)]
     pub(crate) kernel: KernelArg,
+    /// Places at which each pixel is looked at, 1 to 64: edges are smoother, and a picture takes as many times as long [default: 1; in
+    /// the viewer 17, once all else is drawn]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=64), allow_negative_numbers = true, value_name = "N")]
+    pub(crate) samples: Option<u32>,
     /// Direction towards the light [default: the scene's, or a lamp at the viewer's shoulder]
     #[arg(long, value_parser = parse::direction, allow_hyphen_values = true, value_name = "X,Y,Z")]
     pub(crate) light: Option<DVec3>,

@@ -36,6 +36,8 @@ struct ViewReport {
     /// From the last input to the picture that gets no finer; null where it was not waited for.
     rest_to_settled_ms: Option<f32>,
     settled: bool,
+    /// Places at which each pixel of the last picture was looked at.
+    samples: u32,
     threshold_px: Option<f32>,
     max_error_px: Option<f32>,
     limited_by: Option<&'static str>,
@@ -83,6 +85,7 @@ pub(crate) fn run(args: &ViewArgs, console: &Console) -> Result<Outcome, CliErro
         files: args.files.clone(),
         settings: Settings {
             kernel: look.kernel,
+            samples: args.draw.samples.unwrap_or(gigalod_view::SAMPLES),
             towards_light: look.lighting.towards_light,
             background: look.lighting.background,
             tint: args.draw.tint(),
@@ -139,6 +142,7 @@ fn json(report: Report) -> ViewReport {
         first_frame_ms: tally.first_frame_ms,
         rest_to_settled_ms: tally.rest_to_settled_ms,
         settled: last.settled,
+        samples: last.samples,
         threshold_px: has_drawn.then_some(last.report.threshold_px),
         max_error_px: (has_drawn && last.report.max_error_px.is_finite()).then_some(last.report.max_error_px),
         limited_by: last.report.limited_by.map(|limit| limit.name()),

@@ -102,16 +102,20 @@ impl HybridBuffers {
         staging: &mut Staging,
         nodes: &[NodeParams],
         runs: &[RunParams],
-        passes: &[u8],
     ) -> Result<(), RenderError> {
         staging.write_texels(gpu, self.nodes.texture(), 0, bytemuck::cast_slice(nodes))?;
-        staging.write_texels(gpu, self.runs.texture(), 0, bytemuck::cast_slice(runs))?;
-        staging.write(gpu, self.passes.buffer(), 0, passes)
+        staging.write_texels(gpu, self.runs.texture(), 0, bytemuck::cast_slice(runs))
     }
 }
 
 /// The contents of the buffer of passes: all parameters, and last what a draw of large primitives begins with.
-pub(crate) fn pass_bytes(gpu: &Gpu, camera: &Camera, bands: &Bands, plan: &Plan, compute_extent_px: u32) -> Vec<u8> {
+pub(crate) fn pass_bytes(
+    gpu: &Gpu,
+    (camera, middle_px): (&Camera, [f32; 2]),
+    bands: &Bands,
+    plan: &Plan,
+    compute_extent_px: u32,
+) -> Vec<u8> {
     let phases = if gpu.has_wide_keys() { 1 } else { 2 };
     let mut bytes = Vec::new();
     for band in 0..bands.count() {
@@ -126,7 +130,7 @@ pub(crate) fn pass_bytes(gpu: &Gpu, camera: &Camera, bands: &Bands, plan: &Plan,
                     first_run: slice.runs.start,
                     first_point_run: plan.first_runs[0],
                     first_line_run: plan.first_runs[1],
-                    ..HybridParams::new(camera)
+                    ..HybridParams::new(camera, middle_px)
                 };
                 bytes.extend_from_slice(bytemuck::bytes_of(&params));
                 bytes.resize(bytes.len().next_multiple_of(STRIDE as usize), 0);

@@ -14,6 +14,8 @@ pub(crate) const RUN_LOG2: u32 = 10;
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct HybridParams {
     pub(crate) size_px: [f32; 2],
+    /// Where in the picture the view axis meets it: as pixels are sampled, half of the size for their middles.
+    pub(crate) middle_px: [f32; 2],
     /// Pixels covered by one unit of length seen from one unit away, and the inverse.
     pub(crate) focal_px: f32,
     pub(crate) per_focal_px: f32,
@@ -35,10 +37,11 @@ pub(crate) struct HybridParams {
 
 impl HybridParams {
     /// The whole picture, phase 0, no run.
-    pub(crate) fn new(camera: &Camera) -> Self {
+    pub(crate) fn new(camera: &Camera, middle_px: [f32; 2]) -> Self {
         let focal_px = camera.focal_px();
         Self {
             size_px: [camera.size.width as f32, camera.size.height as f32],
+            middle_px,
             focal_px: focal_px as f32,
             per_focal_px: (1.0 / focal_px) as f32,
             near: NEAR,
@@ -188,6 +191,7 @@ mod tests {
             crate::hybrid::SMALL,
             [
                 size_px,
+                middle_px,
                 focal_px,
                 per_focal_px,
                 near,

@@ -4,7 +4,6 @@
 //! the budget, unless it has thousands of nodes or instances.
 
 use super::Renderer;
-use crate::GpuLevel;
 use crate::buffers::Buffers;
 use crate::hybrid::arena;
 use crate::hybrid::keyed::HybridBuffers;
@@ -14,6 +13,7 @@ use crate::splats::params::STRIDE;
 use crate::splats::store;
 use crate::staging::Staging;
 use crate::targets::Targets;
+use crate::{GpuLevel, Look};
 use gigalod_format::hybrid::NodeRecord;
 use gigalod_geom::ImageSize;
 
@@ -23,10 +23,10 @@ const USUAL_PARTS: u64 = 256;
 impl Renderer {
     /// How many splats can be drawn into a picture of this size within the budget, and read back. 0 where there is no room for
     /// the picture itself.
-    pub fn most_splats(&self, size: ImageSize, kernel: Kernel) -> u64 {
+    pub fn most_splats(&self, size: ImageSize, look: &Look) -> u64 {
         const NAMES: u64 = u32::MAX as u64 - 1;
         let Some(budget) = self.budget else { return NAMES };
-        let room = budget.saturating_sub(self.bytes_without_primitives(size, kernel));
+        let room = budget.saturating_sub(self.bytes_without_primitives(size, look));
         // Whole rows of textures, and the smallest slices; the list has room for one slice.
         let listed = if self.gpu.level() > GpuLevel::WebGl { store::WIDTH * keyed::LISTED_BYTES } else { 0 };
         let row = store::ROW_BYTES + (STRIDE * store::WIDTH).div_ceil(keyed::LEAST_IN_SLICE);
@@ -47,20 +47,21 @@ impl Renderer {
 
     /// Bytes of hybrid pages that can be drawn into a picture of this size within the budget, and read back; [`Renderer::page_bytes`]
     /// says what a node's page takes. 0 where there is no room for the picture itself.
-    pub fn most_page_bytes(&self, size: ImageSize, kernel: Kernel) -> u64 {
+    pub fn most_page_bytes(&self, size: ImageSize, look: &Look) -> u64 {
         let most = arena::most_bytes(&self.gpu);
         let Some(budget) = self.budget else { return most };
         // Splats that blend have no use for what their keys have become.
-        let [found, _] = if kernel.is_gauss() { self.bands(size, Kernel::Round).bytes(Kernel::Round) } else { [0; 2] };
-        let taken = self.bytes_without_primitives(size, kernel) + found + HybridBuffers::usual_bytes(&self.gpu);
+        let [found, _] =
+            if look.kernel.is_gauss() { self.bands(size, Kernel::Round).bytes(Kernel::Round) } else { [0; 2] };
+        let taken = self.bytes_without_primitives(size, look) + found + HybridBuffers::usual_bytes(&self.gpu);
         // Whole rows of a texture.
         (budget.saturating_sub(taken) / arena::ROW_BYTES * arena::ROW_BYTES).min(most)
     }
 
     /// How many triangles, points and lines that is, of usual models: half as many vertices as triangles.
-    pub fn most_primitives(&self, size: ImageSize, kernel: Kernel) -> u64 {
+    pub fn most_primitives(&self, size: ImageSize, look: &Look) -> u64 {
         const USUAL_BYTES: u64 = 16;
-        self.most_page_bytes(size, kernel) / USUAL_BYTES
+        self.most_page_bytes(size, look) / USUAL_BYTES
     }
 
     /// Bytes that the page of a hybrid node takes on the device.
@@ -69,14 +70,14 @@ impl Renderer {
     }
 
     /// What a frame without a splat or a node takes.
-    fn bytes_without_primitives(&self, size: ImageSize, kernel: Kernel) -> u64 {
+    fn bytes_without_primitives(&self, size: ImageSize, look: &Look) -> u64 {
         let mut buffers = Buffers::new();
-        let bands = self.bands(size, kernel);
+        let bands = self.bands(size, look.kernel);
         if self.gpu.level() > GpuLevel::WebGl {
-            buffers.keyed.want(&bands, kernel, 0);
+            buffers.keyed.want(&bands, look.kernel, 0);
         }
         buffers.want_parts(STRIDE * USUAL_PARTS, USUAL_PARTS);
         buffers.want_readback(size);
-        Staging::BYTES + Targets::bytes(size) + buffers.least_bytes()
+        Staging::BYTES + Targets::bytes(size, look.samples) + buffers.least_bytes()
     }
 }

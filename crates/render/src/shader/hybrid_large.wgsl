@@ -95,7 +95,7 @@ struct Edge {
 
 // A vertex as its edges see it: where it was rounded to, if it was.
 fn seen(vertex: Vertex) -> vec3f {
-    let from_middle = (vec2f(vertex.at) * (1.0 / f32(1u << SUB_LOG2)) - frame.size_px * 0.5) * (frame.per_focal_px * vertex.in_view.z);
+    let from_middle = (vec2f(vertex.at) * (1.0 / f32(1u << SUB_LOG2)) - frame.middle_px) * (frame.per_focal_px * vertex.in_view.z);
     return select(vertex.in_view, vec3f(from_middle.x, -from_middle.y, vertex.in_view.z), vertex.tame);
 }
 
@@ -138,7 +138,7 @@ fn side_of(edge: Edge, center: vec2i, ray: vec3f) -> Side {
 }
 
 fn ray_of(pixel: vec2i) -> vec3f {
-    let from_middle = vec2f(pixel) + 0.5 - frame.size_px * 0.5;
+    let from_middle = vec2f(pixel) + 0.5 - frame.middle_px;
     return vec3f(from_middle.x * frame.per_focal_px, -from_middle.y * frame.per_focal_px, 1.0);
 }
 

@@ -3,6 +3,8 @@
 // One pass over one slice of runs, into one band of rows of the picture.
 struct HybridParams {
     size_px: vec2f,
+    // Where in the picture the view axis meets it.
+    middle_px: vec2f,
     // Pixels covered by one unit of length seen from one unit away, and the inverse.
     focal_px: f32,
     per_focal_px: f32,

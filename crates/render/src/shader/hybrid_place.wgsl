@@ -38,7 +38,7 @@ fn in_view(node: Node, steps: vec3f) -> vec3f {
 }
 
 fn px_of(view: vec3f, per_z: f32) -> vec2f {
-    return frame.size_px * 0.5 + vec2f(view.x, -view.y) * (frame.focal_px * per_z);
+    return frame.middle_px + vec2f(view.x, -view.y) * (frame.focal_px * per_z);
 }
 
 fn vertex_of(node: Node, index: u32) -> Vertex {

@@ -127,7 +127,7 @@ fn is_back(node: Node, corners: vec3u, normal: vec3f) -> bool {
 // Where the ray of a pixel meets a triangle's plane, as shares of its corners. Edges are differences of whole steps, so they are
 // exact however far the eye is. Source: Möller & Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, JGT 2(1), 1997.
 fn shares_of(node: Node, corners: vec3u, position_px: vec2f) -> vec3f {
-    let from_middle = position_px - frame.size_px * 0.5;
+    let from_middle = position_px - frame.middle_px;
     let ray = vec3f(from_middle.x * frame.per_focal_px, -from_middle.y * frame.per_focal_px, 1.0);
     let from_a = vec3i(position_of(node, corners.x));
     let to_b = in_view(node, vec3f(vec3i(position_of(node, corners.y)) - from_a));

@@ -2,7 +2,7 @@
 //
 // Draw      one triangle that covers the picture.
 // Reads     params; albedo (alpha: how much of the pixel is there, the rest is background) and normal of the pixel.
-// Writes    the picture, in linear light; the target encodes it as sRGB.
+// Writes    the picture, in linear light; the target encodes it as sRGB, or adds it up with others (smooth.wgsl).
 // Limits    none beyond the baseline of WebGPU; depth textures are not loaded from, which OpenGL cannot.
 //
 // Lambert with an ambient share, from both sides: the normal is turned to the side that is seen. A normal that points away by
@@ -30,9 +30,9 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let pixel = vec2u(position.xy);
     let albedo = textureLoad(albedo_texture, pixel, 0);
     if albedo.a == 0.0 {
-        return params.background;
+        return params.background * params.share;
     }
-    let from_middle = position.xy - params.size_px * 0.5;
+    let from_middle = position.xy - params.middle_px;
     let ray = params.forward.xyz + (params.right.xyz * from_middle.x - params.up.xyz * from_middle.y) * (1.0 / params.focal_px);
     let stored = textureLoad(normal_texture, pixel, 0).xyz;
     // Compared as squares: without roots.
@@ -45,5 +45,5 @@ fn light(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let normal = faced * inverseSqrt(dot3(faced, faced));
     let direct = (1.0 - params.ambient) * max(dot3(normal, params.towards_light.xyz), 0.0);
     let lit = albedo.rgb * params.light.rgb * (params.ambient + direct);
-    return vec4f(params.background.rgb * (1.0 - albedo.a) + lit * albedo.a, 1.0);
+    return vec4f(params.background.rgb * (1.0 - albedo.a) + lit * albedo.a, 1.0) * params.share;
 }

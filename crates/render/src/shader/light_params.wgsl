@@ -10,7 +10,13 @@ struct LightParams {
     light: vec4f,
     // Linear light; alpha 1.
     background: vec4f,
-    size_px: vec2f,
+    // Where in the picture the view axis meets it.
+    middle_px: vec2f,
     focal_px: f32,
     ambient: f32,
+    // What this picture is of a sum of several.
+    share: f32,
+    pad_a: f32,
+    pad_b: f32,
+    pad_c: f32,
 }

@@ -3,6 +3,8 @@
 // One pass over one buffer of splats, into one band of rows of the picture.
 struct PassParams {
     size_px: vec2f,
+    // Where in the picture the view axis meets it.
+    middle_px: vec2f,
     // Pixels covered by one unit of length seen from one unit away, and the inverse.
     focal_px: f32,
     per_focal_px: f32,
@@ -22,9 +24,7 @@ struct PassParams {
     wants_footprint: u32,
     // Splats in this buffer.
     chunk_count: u32,
-    pad_a: u32,
-    pad_b: u32,
-    pad_c: u32,
+    pad: u32,
 }
 
 // Consecutive splats of one instance in one buffer.

@@ -97,7 +97,7 @@ fn shape_of(part: PartParams, ball: vec4f, normal_code: u32) -> Shape {
         return out;
     }
     let to_px = frame.focal_px * (1.0 / ((c.z - end) * (c.z + end)));
-    out.middle_px = frame.size_px * 0.5 + vec2f(c.x, -c.y) * (to_px * c.z);
+    out.middle_px = frame.middle_px + vec2f(c.x, -c.y) * (to_px * c.z);
     out.half_px = to_px * end * sqrt(max(dot3(c, c) - end * end, 0.0)) + slack_px;
     var extent = vec2f(out.half_px);
     if is_elliptical() {
@@ -131,7 +131,7 @@ fn shape_of(part: PartParams, ball: vec4f, normal_code: u32) -> Shape {
 
 // The ray of a point of the picture is (slope, 1) · depth.
 fn slope_at(position_px: vec2f) -> vec2f {
-    let from_middle = position_px - frame.size_px * 0.5;
+    let from_middle = position_px - frame.middle_px;
     return vec2f(from_middle.x, -from_middle.y) * frame.per_focal_px;
 }
 

@@ -17,8 +17,8 @@ pub(crate) struct DepthTestPass {
 }
 
 /// The contents of the buffer of passes: one.
-pub(crate) fn pass_bytes(camera: &Camera) -> Vec<u8> {
-    bytemuck::bytes_of(&PassParams::new(camera)).to_vec()
+pub(crate) fn pass_bytes(camera: &Camera, middle_px: [f32; 2]) -> Vec<u8> {
+    bytemuck::bytes_of(&PassParams::new(camera, middle_px)).to_vec()
 }
 
 /// What a frame draws with.

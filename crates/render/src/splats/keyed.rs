@@ -186,7 +186,7 @@ fn has_rounds(gpu: &Gpu, kernel: Kernel) -> bool {
 /// The contents of the buffer of passes: all parameters, and last what a draw of large splats begins with.
 pub(crate) fn pass_bytes(
     gpu: &Gpu,
-    camera: &Camera,
+    (camera, middle_px): (&Camera, [f32; 2]),
     kernel: Kernel,
     bands: &Bands,
     plan: &Plan,
@@ -207,7 +207,7 @@ pub(crate) fn pass_bytes(
                     part_count: parts.end - parts.start,
                     chunk_count: *splats as u32,
                     wants_footprint: u32::from(wants_footprint),
-                    ..PassParams::new(camera)
+                    ..PassParams::new(camera, middle_px)
                 };
                 bytes.extend_from_slice(bytemuck::bytes_of(&params));
                 bytes.resize(bytes.len().next_multiple_of(STRIDE as usize), 0);

@@ -17,6 +17,8 @@ pub(crate) const STRIDE: u64 = 256;
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct PassParams {
     pub(crate) size_px: [f32; 2],
+    /// Where in the picture the view axis meets it: as pixels are sampled, half of the size for their middles.
+    pub(crate) middle_px: [f32; 2],
     /// Pixels covered by one unit of length seen from one unit away, and the inverse.
     pub(crate) focal_px: f32,
     pub(crate) per_focal_px: f32,
@@ -36,9 +38,7 @@ pub(crate) struct PassParams {
     pub(crate) wants_footprint: u32,
     /// Splats in this buffer.
     pub(crate) chunk_count: u32,
-    pub(crate) pad_a: u32,
-    pub(crate) pad_b: u32,
-    pub(crate) pad_c: u32,
+    pub(crate) pad: u32,
 }
 
 /// Consecutive splats of one instance in one buffer.
@@ -64,10 +64,11 @@ pub(crate) struct PartParams {
 
 impl PassParams {
     /// The whole picture, phase 0, no part.
-    pub(crate) fn new(camera: &Camera) -> Self {
+    pub(crate) fn new(camera: &Camera, middle_px: [f32; 2]) -> Self {
         let focal_px = camera.focal_px();
         Self {
             size_px: [camera.size.width as f32, camera.size.height as f32],
+            middle_px,
             focal_px: focal_px as f32,
             per_focal_px: (1.0 / focal_px) as f32,
             near: NEAR,
@@ -79,9 +80,7 @@ impl PassParams {
             part_count: 0,
             wants_footprint: 0,
             chunk_count: 0,
-            pad_a: 0,
-            pad_b: 0,
-            pad_c: 0,
+            pad: 0,
         }
     }
 }
@@ -125,6 +124,7 @@ mod tests {
             crate::splats::COMPUTE,
             [
                 size_px,
+                middle_px,
                 focal_px,
                 per_focal_px,
                 near,
@@ -136,9 +136,7 @@ mod tests {
                 part_count,
                 wants_footprint,
                 chunk_count,
-                pad_a,
-                pad_b,
-                pad_c
+                pad
             ]
         );
         assert!(size_of::<PassParams>() as u64 <= STRIDE);

@@ -5,7 +5,7 @@
 //! What always holds: a picture is as fine as what it was asked with allows, whatever a person does meanwhile: as they come first, it
 //! is drawn when they rest, at the latest when the viewer ends.
 
-use super::{CAMERA, LOOK_FOR_PAGES, Stage};
+use super::{CAMERA, LOOK_FOR_PAGES, Stage, seen};
 use crate::mailbox::{News, Wish};
 use gigalod_render::{Frame, RenderError};
 use gigalod_runtime::Fineness;
@@ -49,14 +49,14 @@ impl Stage {
     }
 
     /// Cuts as fine as was asked for and waits for its pages; false where that was broken off.
-    fn cut_for(&mut self, wish: &Wish) -> bool {
+    pub(super) fn cut_for(&mut self, wish: &Wish) -> bool {
         let interrupt = self.mailbox.interrupt().clone();
-        let room = self.renderer.most_splats(wish.camera.size, wish.look.kernel);
+        let room = self.renderer.most_splats(wish.camera.size, &wish.look);
         let fineness = Fineness { threshold_px: wish.finest_px, most_splats: self.most_splats.min(room) };
         self.scene.set_tint(wish.tint);
         self.cut = None;
         loop {
-            let report = self.scene.select_interruptible(CAMERA, &wish.camera, &fineness, &interrupt);
+            let report = self.scene.select_interruptible(CAMERA, &seen(wish), &fineness, &interrupt);
             self.scene.serve();
             if report.is_none() {
                 return false;
