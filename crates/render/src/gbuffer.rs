@@ -41,6 +41,8 @@ pub(crate) struct GBuffer {
     pub(crate) normal: wgpu::Texture,
     pub(crate) depth: wgpu::Texture,
     pub(crate) depth_test: wgpu::Texture,
+    /// Depths of what was drawn before something that looks at it.
+    pub(crate) before: wgpu::Texture,
 }
 
 impl GBuffer {
@@ -55,12 +57,19 @@ impl GBuffer {
             normal: texture("normal", NORMAL),
             depth: texture("depth", DEPTH),
             depth_test: texture("depth test", DEPTH_TEST),
+            before: create_texture(
+                device,
+                "depth before",
+                size,
+                DEPTH,
+                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            ),
         }
     }
 
     /// Bytes on the device.
     pub(crate) fn bytes(size: ImageSize) -> u64 {
-        size.pixels() as u64 * (4 + 8 + 4 + 4)
+        size.pixels() as u64 * (4 + 8 + 4 + 4 + 4)
     }
 
     /// A pass that draws to it; `clear`: what was there is forgotten.
@@ -85,9 +94,16 @@ impl GBuffer {
         })
     }
 
+    /// Keeps the depths of what has been drawn.
+    pub(crate) fn keep_depths(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_texture_to_texture(self.depth.as_image_copy(), self.before.as_image_copy(), self.depth.size());
+    }
+
     /// Frees it.
     pub(crate) fn free(&self) {
-        [&self.albedo, &self.normal, &self.depth, &self.depth_test].into_iter().for_each(wgpu::Texture::destroy);
+        [&self.albedo, &self.normal, &self.depth, &self.depth_test, &self.before]
+            .into_iter()
+            .for_each(wgpu::Texture::destroy);
     }
 }
 

@@ -2,11 +2,12 @@
 //! stands for one of several files: where a pass delivers what it draws.
 
 /// Sources that others import, by name.
-const SHARED: [(&str, &str); 20] = [
+const SHARED: [(&str, &str); 21] = [
     ("dot.wgsl", include_str!("shader/dot.wgsl")),
     ("hybrid_kinds.wgsl", include_str!("shader/hybrid_kinds.wgsl")),
     ("hybrid_params.wgsl", include_str!("shader/hybrid_params.wgsl")),
     ("hybrid_place.wgsl", include_str!("shader/hybrid_place.wgsl")),
+    ("hybrid_gaps.wgsl", include_str!("shader/hybrid_gaps.wgsl")),
     ("hybrid_spots.wgsl", include_str!("shader/hybrid_spots.wgsl")),
     ("hybrid_store.wgsl", include_str!("shader/hybrid_store.wgsl")),
     ("hybrid_target.wgsl", include_str!("shader/hybrid_target.wgsl")),

@@ -1,13 +1,14 @@
 //! Hybrid nodes through keys: what is nearest in each pixel is found by atomic maxima in a storage buffer, then written to the
 //! G-buffer. Shaders: `shader/hybrid_small.wgsl`, `hybrid_large.wgsl`, `hybrid_resolve.wgsl`.
 //!
-//! As for splats, a picture is drawn in bands of rows and primitives in slices, between which a frame can be broken off.
+//! As for splats, a picture is drawn in bands of rows and primitives in slices, between which a frame can be broken off. Lines come last, in
+//! bands of their own: they look at what is there in the whole picture (`shader/hybrid_gaps.wgsl`).
 
 use crate::commands::Commands;
-use crate::gbuffer::GBuffer;
+use crate::gbuffer::{self, GBuffer};
 use crate::hybrid::params::{HybridParams, NODE_TEXELS, NodeParams, RUN_LOG2};
 use crate::hybrid::pipelines::{Pipelines, Resolving};
-use crate::hybrid::plan::{Plan, RunParams, Slice, most_runs};
+use crate::hybrid::plan::{Kind, Plan, RunParams, Slice, most_runs};
 use crate::memory::Pool;
 use crate::splats::Kernel;
 use crate::splats::keyed::{Bands, KeyedBuffers, LISTED_BYTES, MOST_COMPUTE_EXTENT_PX};
@@ -178,33 +179,41 @@ impl HybridPass {
         frame: &HybridFrame<'_>,
     ) -> Result<bool, RenderError> {
         let pipelines = self.pipelines.as_ref().expect("prepared");
-        let bound = bind(gpu, pipelines, frame);
+        let bound = bind(gpu, pipelines, gbuffer, frame);
         let slices = frame.plan.slices.len() as u32;
         let phases = pipelines.phases();
         let offset = |band: u32, phase: u32, slice: u32| ((band * phases + phase) * slices + slice) * STRIDE as u32;
         let template = u64::from(offset(frame.bands.count(), 0, 0));
         let keys = frame.shared.keys.buffer();
         let [keys_bytes, _] = frame.bands.bytes(Kernel::Round);
-        for band in 0..frame.bands.count() {
-            let rows = frame.bands.rows_of(band);
-            commands.encoder().clear_buffer(keys, 0, Some(keys_bytes));
-            for (phase, (at, slice)) in
-                (0..phases).flat_map(|phase| (0..).zip(&frame.plan.slices).map(move |s| (phase, s)))
-            {
-                draw(commands.encoder(), pipelines, frame, slice, &bound, offset(band, phase, at), template);
-                if !commands.goes_on()? {
-                    return Ok(false);
-                }
+        let first_line = frame.plan.slices.partition_point(|slice| slice.kind < Kind::Lines);
+        for part in [0..first_line, first_line..frame.plan.slices.len()] {
+            if part.is_empty() {
+                continue;
             }
-            frame.shared.find(commands.encoder(), keys_bytes);
-            let mut pass = gbuffer.begin(commands.encoder(), false);
-            pass.set_pipeline(pipelines.resolve(resolving(frame.plan)));
-            let [columns, in_picture] = &frame.plan.window;
-            let (first, end) = (rows.start.max(in_picture.start), rows.end.min(in_picture.end));
-            if columns.start < columns.end && first < end {
-                pass.set_scissor_rect(columns.start, first, columns.end - columns.start, end - first);
-                pass.set_bind_group(0, &bound[2], &[offset(band, 0, 0)]);
-                pass.draw(0..3, 0..1);
+            if frame.plan.slices[part.start].kind == Kind::Lines {
+                gbuffer.keep_depths(commands.encoder());
+            }
+            for band in 0..frame.bands.count() {
+                let rows = frame.bands.rows_of(band);
+                commands.encoder().clear_buffer(keys, 0, Some(keys_bytes));
+                for (phase, at) in (0..phases).flat_map(|phase| part.clone().map(move |at| (phase, at))) {
+                    let (slice, offset) = (&frame.plan.slices[at], offset(band, phase, at as u32));
+                    draw(commands.encoder(), pipelines, frame, slice, &bound, offset, template);
+                    if !commands.goes_on()? {
+                        return Ok(false);
+                    }
+                }
+                frame.shared.find(commands.encoder(), keys_bytes);
+                let mut pass = gbuffer.begin(commands.encoder(), false);
+                pass.set_pipeline(pipelines.resolve(resolving(frame.plan)));
+                let [columns, in_picture] = &frame.plan.window;
+                let (first, end) = (rows.start.max(in_picture.start), rows.end.min(in_picture.end));
+                if columns.start < columns.end && first < end {
+                    pass.set_scissor_rect(columns.start, first, columns.end - columns.start, end - first);
+                    pass.set_bind_group(0, &bound[2], &[offset(band, 0, 0)]);
+                    pass.draw(0..3, 0..1);
+                }
             }
         }
         Ok(true)
@@ -235,7 +244,7 @@ fn draw(
 }
 
 /// Bind groups of the three passes.
-fn bind(gpu: &Gpu, pipelines: &Pipelines, frame: &HybridFrame<'_>) -> [wgpu::BindGroup; 3] {
+fn bind(gpu: &Gpu, pipelines: &Pipelines, gbuffer: &GBuffer, frame: &HybridFrame<'_>) -> [wgpu::BindGroup; 3] {
     let HybridFrame { buffers, shared, .. } = frame;
     let tables = [
         buffers.passes.entry_of::<HybridParams>(0),
@@ -243,7 +252,9 @@ fn bind(gpu: &Gpu, pipelines: &Pipelines, frame: &HybridFrame<'_>) -> [wgpu::Bin
         buffers.nodes.entry(2),
         buffers.runs.entry(3),
     ];
-    let drawn = [shared.keys.entry(4), shared.list.entry(6), shared.draw.entry(7)];
+    let before = gbuffer::view(&gbuffer.before);
+    let before = wgpu::BindGroupEntry { binding: 9, resource: wgpu::BindingResource::TextureView(&before) };
+    let drawn = [shared.keys.entry(4), shared.list.entry(6), shared.draw.entry(7), before];
     let found = [shared.found.entry(9)];
     [&drawn[..], &drawn[..], &found[..]]
         .iter()

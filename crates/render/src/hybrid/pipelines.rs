@@ -161,8 +161,8 @@ fn layouts(device: &wgpu::Device) -> [wgpu::BindGroupLayout; 3] {
     };
     let compute = wgpu::ShaderStages::COMPUTE;
     [
-        layout("small primitives", compute, &[1, 2, 3], &[(4, false), (6, false), (7, false)]),
-        layout("large primitives", compute, &[1, 2, 3], &[(4, false), (6, true), (7, true)]),
+        layout("small primitives", compute, &[1, 2, 3, 9], &[(4, false), (6, false), (7, false)]),
+        layout("large primitives", compute, &[1, 2, 3, 9], &[(4, false), (6, true), (7, true)]),
         layout("resolved nodes", wgpu::ShaderStages::FRAGMENT, &[1, 2, 3, 9], &[]),
     ]
 }

@@ -1,7 +1,7 @@
 // hybrid_large.wgsl: draws the large triangles, points or lines that hybrid_small.wgsl has listed, as that would draw them.
 //
 // Dispatch  indirect: for each listed primitive some workgroups, which share its rows of tiles; 8×8 pixels a tile, one an invocation.
-// Reads     frame; list; runs, nodes, pages.
+// Reads     frame; list; runs, nodes, pages; for lines, what was drawn before.
 // Writes    keys.
 // Limits    as for hybrid_small.wgsl.
 //
@@ -25,6 +25,7 @@ var<private> frame: HybridParams;
 #import hybrid_place.wgsl
 #import hybrid_triangle.wgsl
 #import hybrid_spots.wgsl
+#import hybrid_gaps.wgsl
 #import nearness.wgsl
 #import hybrid_target.wgsl
 #import splat_target.wgsl
@@ -237,7 +238,8 @@ fn draw_spot(node: Node, index: u32, number: u32, share: u32, shares: u32, in_ti
         for (var x = window.x + in_tile.x; x < window.z; x += 8i) {
             let pixel = vec2i(x, y);
             let z = depth_of_spot(spot, pixel);
-            if z > 0.0 && y >= window.y && y < window.w {
+            let is_inside = z > 0.0 && y >= window.y && y < window.w;
+            if is_inside && (kind == POINTS || is_gap(spot, pixel, z)) {
                 deliver(key_of(pixel), Meeting(z), Splat(number));
             }
         }

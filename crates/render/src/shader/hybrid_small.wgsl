@@ -1,7 +1,7 @@
 // hybrid_small.wgsl: draws small triangles, points or lines into the keys of a band, and lists the large ones.
 //
 // Dispatch  a workgroup for each run of the slice.
-// Reads     frame; runs, nodes, pages.
+// Reads     frame; runs, nodes, pages; for lines, what was drawn before.
 // Writes    keys; list of what is large, by number, and how much that is.
 // Limits    none beyond the baseline of WebGPU with 32-bit keys; 64-bit ones need `SHADER_INT64_ATOMIC_MIN_MAX`.
 
@@ -27,6 +27,7 @@ var<private> frame: HybridParams;
 #import hybrid_place.wgsl
 #import hybrid_triangle.wgsl
 #import hybrid_spots.wgsl
+#import hybrid_gaps.wgsl
 #import nearness.wgsl
 #import hybrid_target.wgsl
 #import splat_target.wgsl
@@ -159,7 +160,7 @@ fn draw_spot(node: Node, index: u32, number: u32) -> bool {
     var pixel = window.xy;
     loop {
         let z = depth_of_spot(spot, pixel);
-        if z > 0.0 {
+        if z > 0.0 && (kind == POINTS || is_gap(spot, pixel, z)) {
             deliver(key_of(pixel), Meeting(z), Splat(number));
         }
         pixel.x++;
