@@ -50,10 +50,8 @@ fn keeps_its_word(model: &str, count: u64) {
         judged += verdict.judged.count();
         if let Some(error) = screen_error::largest(&bvh, &camera, &picture.depth) {
             finite += 1;
-            // A point is a square, a line has a width; both say how wide.
-            let [x, y] = error.pixel;
-            let footprint_px = f64::from(picture.footprint_px[(y * SIZE.width + x) as usize]);
-            let claimed_px = f64::from(report.max_error_px) + footprint_px.max(0.5) * 2f64.sqrt();
+            // A point is a pixel wide at least.
+            let claimed_px = f64::from(report.max_error_px) + 0.5f64.sqrt();
             tightest = tightest.max(error.px / claimed_px);
             assert!(error.px <= claimed_px + ROUNDING_PX, "{what}: {error:?}, claimed {claimed_px}");
         }

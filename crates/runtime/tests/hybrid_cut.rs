@@ -97,7 +97,8 @@ fn judge(octree: &Octree, camera: &Camera, node: NodeId) -> Judged {
     let max = min + DVec3::from_array(record.extent_steps.map(f64::from)) * step + 2.0 * around;
     let nearest = (camera.eye.clamp(min, max) - camera.eye).length();
     let depth = depth.max(nearest / slope.hypot(1.0));
-    let error_px = projected::shift_px(slope, depth, f64::from(record.error_total), camera.focal_px());
+    let drawn = f64::from(record.error_total) + if record.points > 0 { spacing * 0.5f64.sqrt() } else { 0.0 };
+    let error_px = projected::shift_px(slope, depth, drawn, camera.focal_px());
     Judged { is_outside, error_px }
 }
 

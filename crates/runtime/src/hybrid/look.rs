@@ -40,7 +40,7 @@ pub(super) struct Look<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sight {
     pub(super) node: u32,
-    /// `error_total`, projected: how far off on the screen it may be drawn.
+    /// [`drawn_error`], projected: how far off on the screen it may be drawn.
     pub(super) error_px: f32,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Look<'a> {
         }
         // Whatever does not compare is as bad as can be.
         let shown = half + geo + f64::from(record.spacing).max(0.0) * 0.5;
-        let error_px = self.error_px(center, shown, f64::from(record.error_total)) as f32;
+        let error_px = self.error_px(center, shown, drawn_error(record)) as f32;
         Some(Sight { node, error_px: if error_px.is_nan() { f32::INFINITY } else { error_px } })
     }
 
@@ -181,6 +181,13 @@ impl<'a> Look<'a> {
         };
         side(self.right, width) * side(self.up, height)
     }
+}
+
+/// How far from the original something of a node may be drawn; model units. Points are squares, and their corners are farther off than the
+/// points themselves.
+pub(super) fn drawn_error(record: &NodeRecord) -> f64 {
+    let corner = if record.points > 0 { f64::from(record.spacing).max(0.0) * POINT_REACH } else { 0.0 };
+    f64::from(record.error_total) + corner
 }
 
 /// 2 to this, as exactly as there are numbers.
