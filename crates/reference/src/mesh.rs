@@ -22,8 +22,6 @@ pub struct Mesh {
     colors: Option<Vec<[u8; 3]>>,
     triangles: Vec<[u32; 3]>,
     bounds: Aabb,
-    /// They were given; not computed here.
-    has_own_normals: bool,
     skin: Option<Skin>,
 }
 
@@ -107,9 +105,8 @@ impl Mesh {
                 bounds = bounds.including(position);
             }
         }
-        let has_own_normals = normals.is_some();
         let normals = normals.unwrap_or_else(|| vertex_normals(&positions, &triangles));
-        Ok(Self { positions, normals, colors, triangles, bounds, has_own_normals, skin: None })
+        Ok(Self { positions, normals, colors, triangles, bounds, skin: None })
     }
 
     /// The same mesh with materials and textures.
@@ -169,19 +166,11 @@ impl Mesh {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Interpolated, normalised vertex normal; `None` where the vertex normals cancel or are not numbers. Where normals were not given,
-    /// edges are sharp: a corner whose vertex normal is [`SHARP_DEGREES`] or more from the triangle's own has that one.
+    /// Interpolated, normalised vertex normal; `None` where the vertex normals cancel or are not numbers.
     pub fn smooth_normal(&self, triangle: u32, barycentrics: [f64; 3]) -> Option<DVec3> {
-        let flat = self.flat_normal(triangle);
-        let is_sharp = |normal: DVec3| {
-            !self.has_own_normals && flat != DVec3::ZERO && flat.angle_between(normal) >= SHARP_DEGREES.to_radians()
-        };
-        let normal_of = |vertex: u32| {
-            let normal = self.normals[vertex as usize].as_dvec3();
-            if is_sharp(normal) { flat } else { normal }
-        };
         let corners = self.triangles[triangle as usize];
-        let sum: DVec3 = corners.iter().zip(barycentrics).map(|(&vertex, weight)| normal_of(vertex) * weight).sum();
+        let sum: DVec3 =
+            corners.iter().zip(barycentrics).map(|(&v, weight)| self.normals[v as usize].as_dvec3() * weight).sum();
         sum.try_normalize()
     }
 
@@ -198,10 +187,6 @@ impl Mesh {
         }
     }
 }
-
-/// An edge is sharp where normals turn by so much from a triangle to its vertex: more than where scanners are noisy, less than at the
-/// edges of regular solids.
-pub const SHARP_DEGREES: f64 = 35.0;
 
 /// Linear RGB of an 8-bit sRGB colour.
 pub fn linear_of_srgb8(srgb: [u8; 3]) -> Vec3 {
@@ -240,21 +225,6 @@ mod tests {
         for (position, normal) in cube.positions().iter().zip(cube.normals()) {
             let diagonal = (*position - DVec3::splat(0.5)).normalize();
             assert!((normal.as_dvec3() - diagonal).length() < 1e-6, "{position}: {normal}");
-        }
-    }
-
-    #[test]
-    fn edges_of_regular_solids_are_sharp_and_what_is_round_is_smooth() {
-        for solid in [fixtures::cube(DVec3::ZERO), fixtures::icosphere(0, DVec3::ZERO)] {
-            for triangle in 0..solid.triangles().len() as u32 {
-                let normal = solid.smooth_normal(triangle, [0.9, 0.1, 0.0]).unwrap();
-                assert!((normal - solid.flat_normal(triangle)).length() < 1e-6, "{triangle}: {normal}");
-            }
-        }
-        let ball = fixtures::icosphere(1, DVec3::ZERO);
-        for triangle in 0..ball.triangles().len() as u32 {
-            let normal = ball.smooth_normal(triangle, [1.0, 0.0, 0.0]).unwrap();
-            assert!((normal - ball.corners(triangle)[0].normalize()).length() < 1e-3, "{triangle}: {normal}");
         }
     }
 

@@ -59,16 +59,22 @@ pub(crate) fn check(gpu: &Gpu, samples: u32) -> Result<(), RenderError> {
 /// # Source
 /// Dammertz & Keller, *Image Synthesis by Rank-1 Lattices*, MCQMC 2006: the generator with the largest smallest distance, on the torus.
 fn places(samples: u32) -> impl Iterator<Item = DVec2> {
-    let signed = move |at: u32| {
-        let at = i64::from(at % samples);
-        (if 2 * at > i64::from(samples) { at - i64::from(samples) } else { at }) as f64 / f64::from(samples)
+    // Half a pixel to one side is half a pixel to the other: so many this way, so many that.
+    let signed = move |at: u32, turns: bool| {
+        let (at, all) = (i64::from(at % samples), i64::from(samples));
+        (if 2 * at > all || 2 * at == all && turns { at - all } else { at }) as f64 / f64::from(samples)
     };
-    let place = move |generator: u32, at: u32| DVec2::new(signed(at), signed(at * generator));
+    let place = move |generator: u32, at: u32| {
+        let product = at * generator;
+        DVec2::new(signed(at, false), signed(product, (product / samples) % 2 == 1))
+    };
     let least_squared = move |generator: &u32| {
         (1..samples).map(|at| place(*generator, at).length_squared()).fold(f64::INFINITY, f64::min)
     };
-    // The first of the best.
-    let generator = (1..samples).rev().max_by(|a, b| least_squared(a).total_cmp(&least_squared(b))).unwrap_or(1);
+    // At most two places in a row. The first of the best.
+    let spreads = |generator: &u32| (1..samples).filter(|at| at * generator % samples == 0).count() < 2;
+    let generator =
+        (1..samples).rev().filter(spreads).max_by(|a, b| least_squared(a).total_cmp(&least_squared(b))).unwrap_or(1);
     (0..samples).rev().map(move |at| place(generator, at))
 }
 

@@ -1,7 +1,7 @@
 //! From a mesh to pieces: triangles that have all that belongs to them with them, and need no vertices any more.
 //!
 //! In: the mesh as it was read. Out: pieces in the order of its triangles, and what holds for the whole model. Normals are the mesh's own,
-//! or else gathered from the triangles around each vertex; those of edges that are sharp are their triangles' own.
+//! or else gathered from the triangles around each vertex.
 
 use super::octree::Piece;
 use super::weld::code_of;
@@ -29,10 +29,6 @@ pub(super) struct Facts {
     pub(super) closed: bool,
     pub(super) has_colors: bool,
 }
-
-/// Cosine of the angle from which on a corner has its triangle's normal, and not what was gathered around its vertex: 35°. At edges of a
-/// cube these are 45° apart, at corners of an icosahedron 37°. What is smooth, and the noise of scanners, has few such corners.
-const SHARP_COSINE: f64 = 0.819;
 
 /// Name of the spool.
 pub(super) const PIECES: &str = "pieces";
@@ -104,11 +100,7 @@ fn join<C: Corner>(
             if own != Vec3::ZERO {
                 return code_of(own);
             }
-            let gathered = DVec3::from_array(sums[corner].normal.map(|sum| sum as f64)).normalize_or(DVec3::Z);
-            let [a, b, c] = [0, 1, 2].map(|side| at[corner / 3 * 3 + side].exact());
-            let flat = (b - a).cross(c - a).try_normalize();
-            let is_sharp = |flat: &DVec3| flat.dot(gathered) < SHARP_COSINE;
-            code_of(flat.filter(is_sharp).unwrap_or(gathered).as_vec3())
+            code_of(Vec3::from_array(sums[corner].normal.map(|sum| sum as f32)).normalize_or(Vec3::Z))
         };
         let piece = |triangle: usize| {
             let corners = [0, 1, 2].map(|side| triangle * 3 + side);
