@@ -64,8 +64,9 @@ fn a_smooth_picture_is_near_the_ray_tracers_and_its_depths_are_those_of_one_samp
             a.iter().zip(&b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / 3.0
         };
         let (width, height) = (SIZE.width as usize, SIZE.height as usize);
-        let is_edge =
-            |at: &usize| at % width == 0 || at % width == width - 1 || at / width == 0 || at / width == height - 1;
+        let is_edge = |at: &usize| {
+            at.is_multiple_of(width) || at % width == width - 1 || at / width == 0 || at / width == height - 1
+        };
         let mean = |of: &dyn Fn(&usize) -> bool| {
             let all: Vec<f64> = (0..width * height).filter(of).map(off).collect();
             all.iter().sum::<f64>() / all.len() as f64

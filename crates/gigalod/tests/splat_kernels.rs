@@ -35,7 +35,8 @@ fn small_camera() -> Camera {
 }
 
 fn picture(renderer: &mut Renderer, camera: &Camera, kernel: Kernel, draws: &[(Similarity, &DrawSource)]) -> Picture {
-    let look = Look { kernel, lighting: Lighting { background: [0; 3], ..Lighting::default() } };
+    let lighting = Lighting { background: [0; 3], ..Lighting::default() };
+    let look = Look { kernel, lighting, ..Look::default() };
     renderer.picture(&Frame { camera: *camera, look, draws: draws.to_vec() }).unwrap()
 }
 
@@ -331,7 +332,8 @@ fn gaussians_flicker_least() {
             scene.select_converged(ViewId(0), camera, &Fineness::px(1.0));
             let draws =
                 scene.draws(ViewId(0)).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
-            let shown = renderer.picture(&Frame { camera: *camera, look: Look { kernel, lighting }, draws }).unwrap();
+            let look = Look { kernel, lighting, ..Look::default() };
+            let shown = renderer.picture(&Frame { camera: *camera, look, draws }).unwrap();
             green(&shown.rgba.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect::<Vec<_>>())
         });
         shimmer(&frames.collect::<Vec<_>>())

@@ -72,7 +72,7 @@ fn places(samples: u32) -> impl Iterator<Item = DVec2> {
         (1..samples).map(|at| place(*generator, at).length_squared()).fold(f64::INFINITY, f64::min)
     };
     // At most two places in a row. The first of the best.
-    let spreads = |generator: &u32| (1..samples).filter(|at| at * generator % samples == 0).count() < 2;
+    let spreads = |generator: &u32| (1..samples).filter(|at| (at * generator).is_multiple_of(samples)).count() < 2;
     let generator =
         (1..samples).rev().filter(spreads).max_by(|a, b| least_squared(a).total_cmp(&least_squared(b))).unwrap_or(1);
     (0..samples).rev().map(move |at| place(generator, at))

@@ -90,6 +90,8 @@ pub struct Figures {
     pub settled: bool,
     /// Places at which each pixel was looked at.
     pub samples: u32,
+    /// And edges get no smoother.
+    pub finished: bool,
     /// Frames so far.
     pub frames: u64,
     /// What is wrong with files, as far as they were read.
@@ -169,8 +171,11 @@ impl Mailbox {
 
     pub(crate) fn order(&self, order: Order) {
         let mut inbox = self.inbox();
+        // A picture for a file is taken when nothing moves: it need not wait longer for having been asked for.
+        if !matches!(order, Order::Picture(..)) {
+            self.interrupt.set();
+        }
         inbox.orders.push_back(order);
-        self.interrupt.set();
         self.arrived.notify_one();
     }
 

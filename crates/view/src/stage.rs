@@ -299,6 +299,7 @@ impl Stage {
             bytes_read: self.scene.residency().bytes_read(),
             settled,
             samples: 1,
+            finished: settled && wish.look.samples == 1,
             frames: self.frames,
             problems: self.problems(&report),
         };

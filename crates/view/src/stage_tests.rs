@@ -124,6 +124,16 @@ fn a_picture_is_as_fine_as_it_gets_whatever_is_wished_for_meanwhile() {
         assert_eq!(name, PathBuf::from("moved"));
         assert!(moved == rested, "the same picture, after {wait_ms} ms");
     }
+    // Who asks again and again does not wait longer.
+    let mut asked = 0;
+    while mailbox.collect().news.is_empty() {
+        assert!(asked < 2000, "it never came to be so");
+        mailbox.order(Order::Picture(format!("impatient {asked}").into(), staged.wish(20.0)));
+        asked += 1;
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let last = format!("impatient {}", asked - 1);
+    while asked > 1 && hears(mailbox, picture).0 != PathBuf::from(&last) {}
     // In their order, and those that nobody has waited for.
     staged.takes(number, "first", 20.0);
     staged.takes(number + 1, "second", 20.0);

@@ -326,7 +326,7 @@ fn the_panel_fits_a_small_window_and_says_how_fine_the_picture_is() {
     };
     let mut shows = |limited_by, settled| {
         let report = CutReport { max_error_px: 7.3, threshold_px: 1.0, limited_by, ..Default::default() };
-        let figures = Figures { report, typical_px: 2.1, settled, frames: 1, ..Default::default() };
+        let figures = Figures { report, typical_px: 2.1, settled, finished: settled, frames: 1, ..Default::default() };
         person.viewer().mailbox.show(None, figures);
         person.harness.run_steps(2);
         let told = |text: &str| person.harness.query_by_label(text).is_some();

@@ -19,9 +19,7 @@ impl Viewer {
             _ if figures.frames == 0 => ("the first picture is being drawn", false),
             (Some(Limit::Residency), false) => ("being loaded", false),
             (_, false) => ("being refined", false),
-            (_, true) if figures.samples < self.settings.samples => {
-                ("as fine as it gets, edges are being smoothed", false)
-            }
+            (_, true) if !figures.finished => ("as fine as it gets, edges are being smoothed", false),
             (None, true) => ("as fine as asked for", true),
             (Some(Limit::Data), true) => ("as fine as the data are", true),
             (Some(Limit::Residency), true) => ("as fine as its memory allows", true),

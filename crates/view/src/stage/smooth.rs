@@ -4,7 +4,7 @@
 //! off, and the picture stays as it was.
 
 use super::{CAMERA, Stage};
-use crate::mailbox::{News, Wish};
+use crate::mailbox::{Figures, News, Wish};
 use gigalod_render::{Frame, RenderError};
 use std::time::Instant;
 
@@ -31,13 +31,14 @@ impl Stage {
                 // The picture is what it was.
                 self.is_smooth = true;
                 self.mailbox.tell(News::Problem(error.to_string()));
+                self.mailbox.show(self.renderer.shown(), Figures { finished: true, ..self.figures.clone() });
                 return;
             }
         }
         self.is_smooth = true;
         self.frames += 1;
-        let mut figures = self.figures.clone();
-        (figures.wish, figures.frames, figures.samples) = (number, self.frames, samples);
+        let mut figures =
+            Figures { wish: number, frames: self.frames, samples, finished: true, ..self.figures.clone() };
         (figures.frame_ms, figures.gpu_bytes) = (begun.elapsed().as_secs_f64() * 1e3, self.renderer.gpu_bytes());
         self.mailbox.show(self.renderer.shown(), figures);
     }
