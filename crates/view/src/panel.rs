@@ -101,12 +101,6 @@ impl Viewer {
                 .suffix(" ms");
             ui.add(slider).labelled_by(label.id);
             ui.end_row();
-            let label = ui
-                .label("Smooth edges")
-                .on_hover_text("Places at which each pixel is looked at, once all else is drawn");
-            let slider = Slider::new(&mut settings.samples, 1..=gigalod_render::MOST_SAMPLES).logarithmic(true);
-            ui.add(slider).labelled_by(label.id);
-            ui.end_row();
             let label = ui.label("Kernel");
             let chosen = egui::ComboBox::from_id_salt("kernel").selected_text(kernel_name(settings.kernel));
             let list = chosen.show_ui(ui, |ui| {
@@ -153,6 +147,12 @@ impl Viewer {
     fn budgets_section(&mut self, ui: &mut Ui) {
         let settings = &mut self.settings;
         Grid::new("budgets").num_columns(2).spacing([8.0, 5.0]).show(ui, |ui| {
+            let label = ui
+                .label("Smooth edges")
+                .on_hover_text("Places at which each pixel is looked at, once all else is drawn");
+            let slider = Slider::new(&mut settings.samples, 1..=gigalod_render::MOST_SAMPLES).logarithmic(true);
+            ui.add(slider).labelled_by(label.id);
+            ui.end_row();
             ui.label("Memory").on_hover_text("Most memory for decoded pages and lists");
             mebibytes(ui, &mut settings.cpu_budget);
             ui.end_row();

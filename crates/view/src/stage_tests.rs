@@ -132,8 +132,8 @@ fn a_picture_is_as_fine_as_it_gets_whatever_is_wished_for_meanwhile() {
         asked += 1;
         std::thread::sleep(Duration::from_millis(5));
     }
-    let last = format!("impatient {}", asked - 1);
-    while asked > 1 && hears(mailbox, picture).0 != PathBuf::from(&last) {}
+    let last = PathBuf::from(format!("impatient {}", asked - 1));
+    while asked > 1 && hears(mailbox, picture).0 != last {}
     // In their order, and those that nobody has waited for.
     staged.takes(number, "first", 20.0);
     staged.takes(number + 1, "second", 20.0);
