@@ -41,8 +41,8 @@ pub(crate) struct GBuffer {
     pub(crate) normal: wgpu::Texture,
     pub(crate) depth: wgpu::Texture,
     pub(crate) depth_test: wgpu::Texture,
-    /// Depths of what was drawn before something that looks at it.
-    pub(crate) before: wgpu::Texture,
+    /// Depths of what was drawn before lines, which look at it; only where there are any.
+    pub(crate) before: Option<wgpu::Texture>,
 }
 
 impl GBuffer {
@@ -57,19 +57,13 @@ impl GBuffer {
             normal: texture("normal", NORMAL),
             depth: texture("depth", DEPTH),
             depth_test: texture("depth test", DEPTH_TEST),
-            before: create_texture(
-                device,
-                "depth before",
-                size,
-                DEPTH,
-                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            ),
+            before: None,
         }
     }
 
     /// Bytes on the device.
     pub(crate) fn bytes(size: ImageSize) -> u64 {
-        size.pixels() as u64 * (4 + 8 + 4 + 4 + 4)
+        size.pixels() as u64 * (4 + 8 + 4 + 4)
     }
 
     /// A pass that draws to it; `clear`: what was there is forgotten.
@@ -94,16 +88,32 @@ impl GBuffer {
         })
     }
 
-    /// Keeps the depths of what has been drawn.
+    /// Bytes of the depths before lines.
+    pub(crate) fn before_bytes(size: ImageSize, has_lines: bool) -> u64 {
+        if has_lines { size.pixels() as u64 * 4 } else { 0 }
+    }
+
+    /// Makes room for depths before lines where there are lines, and frees it where there are none.
+    pub(crate) fn want_before(&mut self, device: &wgpu::Device, has_lines: bool) {
+        if !has_lines {
+            self.before.take().iter().for_each(wgpu::Texture::destroy);
+        } else if self.before.is_none() {
+            let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+            self.before = Some(create_texture(device, "depth before", self.size, DEPTH, usage));
+        }
+    }
+
+    /// Keeps the depths of what has been drawn, where there are lines.
     pub(crate) fn keep_depths(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.copy_texture_to_texture(self.depth.as_image_copy(), self.before.as_image_copy(), self.depth.size());
+        if let Some(before) = &self.before {
+            encoder.copy_texture_to_texture(self.depth.as_image_copy(), before.as_image_copy(), self.depth.size());
+        }
     }
 
     /// Frees it.
     pub(crate) fn free(&self) {
-        [&self.albedo, &self.normal, &self.depth, &self.depth_test, &self.before]
-            .into_iter()
-            .for_each(wgpu::Texture::destroy);
+        [&self.albedo, &self.normal, &self.depth, &self.depth_test].into_iter().for_each(wgpu::Texture::destroy);
+        self.before.iter().for_each(wgpu::Texture::destroy);
     }
 }
 

@@ -252,11 +252,11 @@ impl Renderer {
     /// Targets of this size, and buffers for a frame, of which all is wanted but the pages of nodes; within the budget, or with an
     /// error and nothing changed.
     fn make_room(&mut self, sent: &OnDevice, page_bytes: u64) -> Result<(), RenderError> {
-        let (size, samples) = (sent.camera.size, sent.look.samples);
+        let (size, samples, has_lines) = (sent.camera.size, sent.look.samples, sent.hybrid.has_lines());
         if sent.read_back {
             self.buffers.want_readback(size);
         }
-        let other = Staging::BYTES + Targets::bytes(size, samples);
+        let other = Staging::BYTES + Targets::bytes(size, samples, has_lines);
         let stale = self.targets.take_if(|targets| targets.gbuffer.size != size);
         if let Some(targets) = stale {
             targets.free();
@@ -271,7 +271,7 @@ impl Renderer {
             }
         }
         fitted?;
-        self.targets.get_or_insert_with(|| Targets::new(&self.gpu, size)).want_sum(&self.gpu, samples);
+        self.targets.get_or_insert_with(|| Targets::new(&self.gpu, size)).want(&self.gpu, samples, has_lines);
         self.gpu.check()
     }
 

@@ -42,17 +42,19 @@ impl Targets {
     }
 
     /// Bytes on the device.
-    pub(crate) fn bytes(size: ImageSize, samples: u32) -> u64 {
-        GBuffer::bytes(size) + size.pixels() as u64 * 4 + smooth::sum_bytes(size, samples)
+    pub(crate) fn bytes(size: ImageSize, samples: u32, has_lines: bool) -> u64 {
+        let further = smooth::sum_bytes(size, samples) + GBuffer::before_bytes(size, has_lines);
+        GBuffer::bytes(size) + size.pixels() as u64 * 4 + further
     }
 
     /// Bytes that these take.
     pub(crate) fn own_bytes(&self) -> u64 {
-        Self::bytes(self.gbuffer.size, if self.sum.is_some() { 2 } else { 1 })
+        Self::bytes(self.gbuffer.size, if self.sum.is_some() { 2 } else { 1 }, self.gbuffer.before.is_some())
     }
 
-    /// Makes a sum where one is needed, and frees it where none is.
-    pub(crate) fn want_sum(&mut self, gpu: &Gpu, samples: u32) {
+    /// Makes what a frame of so many samples, with lines or without, needs besides, and frees what it does not.
+    pub(crate) fn want(&mut self, gpu: &Gpu, samples: u32, has_lines: bool) {
+        self.gbuffer.want_before(&gpu.device, has_lines);
         if samples == 1 {
             self.sum.take().iter().for_each(wgpu::Texture::destroy);
         } else if self.sum.is_none() {

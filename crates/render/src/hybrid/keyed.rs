@@ -252,7 +252,8 @@ fn bind(gpu: &Gpu, pipelines: &Pipelines, gbuffer: &GBuffer, frame: &HybridFrame
         buffers.nodes.entry(2),
         buffers.runs.entry(3),
     ];
-    let before = gbuffer::view(&gbuffer.before);
+    // Nothing but lines looks at it.
+    let before = gbuffer::view(gbuffer.before.as_ref().unwrap_or(&gbuffer.depth));
     let before = wgpu::BindGroupEntry { binding: 9, resource: wgpu::BindingResource::TextureView(&before) };
     let drawn = [shared.keys.entry(4), shared.list.entry(6), shared.draw.entry(7), before];
     let found = [shared.found.entry(9)];

@@ -130,6 +130,11 @@ impl Plan {
         self.slices.is_empty()
     }
 
+    /// True where there are lines.
+    pub(crate) fn has_lines(&self) -> bool {
+        self.slices.last().is_some_and(|slice| slice.kind == Kind::Lines)
+    }
+
     /// True where there are points or lines.
     pub(crate) fn has_spots(&self) -> bool {
         self.slices.iter().any(|slice| slice.kind != Kind::Triangles)

@@ -5,6 +5,7 @@
 
 use super::Renderer;
 use crate::buffers::Buffers;
+use crate::gbuffer::GBuffer;
 use crate::hybrid::arena;
 use crate::hybrid::keyed::HybridBuffers;
 use crate::splats::Kernel;
@@ -53,7 +54,10 @@ impl Renderer {
         // Splats that blend have no use for what their keys have become.
         let [found, _] =
             if look.kernel.is_gauss() { self.bands(size, Kernel::Round).bytes(Kernel::Round) } else { [0; 2] };
-        let taken = self.bytes_without_primitives(size, look) + found + HybridBuffers::usual_bytes(&self.gpu);
+        let taken = self.bytes_without_primitives(size, look)
+            + GBuffer::before_bytes(size, true)
+            + found
+            + HybridBuffers::usual_bytes(&self.gpu);
         // Whole rows of a texture.
         (budget.saturating_sub(taken) / arena::ROW_BYTES * arena::ROW_BYTES).min(most)
     }
@@ -78,6 +82,6 @@ impl Renderer {
         }
         buffers.want_parts(STRIDE * USUAL_PARTS, USUAL_PARTS);
         buffers.want_readback(size);
-        Staging::BYTES + Targets::bytes(size, look.samples) + buffers.least_bytes()
+        Staging::BYTES + Targets::bytes(size, look.samples, false) + buffers.least_bytes()
     }
 }
