@@ -247,10 +247,12 @@ fn lines_close_the_gaps_between_nodes() {
         let bvh = Bvh::build(&mesh);
         let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
         let touched = supersampled_coverage(&bvh, &camera, 4);
-        let mut holes = Vec::new();
+        let (mut holes, mut beyond) = (Vec::new(), Vec::new());
         for draws_lines in [false, true] {
             let draw = model.draw(0, draws_lines);
             let drawn = picture(&mut renderer, &camera, &[(Similarity::IDENTITY, &draw)]);
+            let is_beyond = |at: &usize| drawn.depth[*at].is_finite() && !touched.members[*at];
+            beyond.push((0..drawn.depth.len()).filter(is_beyond).count());
             show(&format!("{name}_{draws_lines}"), &drawn);
             let verdict = judge(&truth, &touched, &Drawn { depth: &drawn.depth, data_footprint_px: None }, error_px);
             assert_eq!(verdict.fat.len(), 0, "{name}: fat {:?}", verdict.fat.first());
@@ -267,6 +269,12 @@ fn lines_close_the_gaps_between_nodes() {
         println!("{name}: {} holes without lines", holes[0].len());
         assert!(!holes[0].is_empty(), "{name}: there is something to close");
         assert!(holes[1].is_empty(), "{name}: {} holes, {:?}", holes[1].len(), holes[1].first());
+        println!("{name}: {beyond:?} pixels beyond the outline, without lines and with them");
+        // Where a gap meets the outline it is closed too.
+        assert!(
+            beyond[1] <= beyond[0] + 5 + (15.0 * error_px) as usize,
+            "{name}: {beyond:?}, lines close gaps and no more"
+        );
     }
 }
 

@@ -2,7 +2,6 @@
 
 use super::error::CliError;
 use gigalod_build::{FileIdentity, SideLog};
-#[cfg(feature = "view")]
 use gigalod_format::{Container, FileStore, FormatError};
 use gigalod_import::{ByteSource, ModelStream, SideFiles, Stamp};
 use gigalod_runtime::ModelFile;
