@@ -31,6 +31,7 @@ pub(super) fn rows(bench: &Bench, scope: Scope<'_>, rows: &mut Vec<Row>) -> Resu
     }
     if let Some((name, file, _)) = models.first().filter(|(name, ..)| *name == "dragon") {
         quality(bench, name, file, rows)?;
+        looks(bench, name, file, rows)?;
         drawn(bench, name, file, rows)?;
     }
     Ok(())
@@ -97,6 +98,36 @@ fn quality(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Resul
 }
 
 /// Primitives and time, in one run.
+/// Samples of a pixel where shimmer is judged: what the viewer shows at rest.
+const SAMPLES: &str = "17";
+
+/// Shimmer, and what keeping the appearance is worth: how near pictures of so many triangles are to a filtered one.
+fn looks(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<()> {
+    let measure = |kind: &str, threshold_px: &str| -> Result<Value> {
+        let report = bench.example("gigalod", "shimmer", &[model, threshold_px, kind, SAMPLES])?;
+        Ok(report["kernels"]["Round"].clone())
+    };
+    let shimmer = measure("hybrid", "0.5")?;
+    let figure = format!("a slow dolly at 0.5 px, {name}, {SAMPLES} samples a pixel");
+    rows.push(at_most(format!("shimmer, {figure}"), number(&shimmer, "shimmer"), 1.2, "of the filtered original's"));
+    rows.push(at_least(format!("sharpness, {figure}"), number(&shimmer, "sharpness"), 0.9, "of its"));
+    let without: Vec<[f64; 2]> = ["0.5", "1", "2", "4", "8"]
+        .iter()
+        .map(|px| measure("geometry", px).map(|at| [number(&at, "primitives").ln(), number(&at, "psnr_db")]))
+        .collect::<Result<_>>()?;
+    for px in ["1", "2", "4"] {
+        let with = measure("hybrid", px)?;
+        let [count, db] = ["primitives", "psnr_db"].map(|key| number(&with, key));
+        // Along a line between the two nearest.
+        let between = without.windows(2).find(|two| two[1][0] <= count.ln()).context("as many without appearance")?;
+        let [[more, db_more], [fewer, db_fewer]] = [between[0], between[1]];
+        let expected = db_fewer + (db_more - db_fewer) * (count.ln() - fewer) / (more - fewer);
+        let figure = format!("{:.0} k triangles, {name}: appearance kept ({db:.1} dB) against not", count / 1e3);
+        rows.push(at_least(figure, db - expected, 0.0, "dB more"));
+    }
+    Ok(())
+}
+
 fn drawn(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<()> {
     for (kind, out) in [("hybrid", "hybrid.glod"), ("splats", "splats.glod")] {
         bench.0.gigalod(&["build", model, "-o", out, "--as", kind])?;
