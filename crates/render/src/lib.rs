@@ -9,6 +9,7 @@
 
 mod buffers;
 mod commands;
+mod cover;
 mod error;
 mod frame;
 mod gbuffer;

@@ -4,7 +4,7 @@ use crate::gbuffer::{self, GBuffer};
 use crate::memory::Pool;
 use crate::shader::{self, Target};
 use crate::splats::params::four;
-use crate::{Gpu, smooth};
+use crate::{Gpu, cover, smooth};
 use gigalod_geom::Camera;
 use gigalod_geom::color::LINEAR_OF_SRGB8;
 use glam::DVec3;
@@ -69,61 +69,19 @@ impl LightPass {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         let device = &gpu.device;
         let module = shader::module(device, "light.wgsl", SOURCE, Target::None);
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
+        let params = wgpu::BindGroupLayoutEntry {
+            binding: 0,
             visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: std::num::NonZeroU64::new(size_of::<LightParams>() as u64),
+            },
             count: None,
         };
-        let texture = |sample_type| wgpu::BindingType::Texture {
-            sample_type,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
-        let unfiltered = wgpu::TextureSampleType::Float { filterable: false };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("light"),
-            entries: &[
-                entry(
-                    0,
-                    wgpu::BindingType::Buffer {
-                        ty: wgpu::BufferBindingType::Uniform,
-                        has_dynamic_offset: false,
-                        min_binding_size: std::num::NonZeroU64::new(size_of::<LightParams>() as u64),
-                    },
-                ),
-                entry(1, texture(unfiltered)),
-                entry(2, texture(unfiltered)),
-            ],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("light"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline_to = |target: wgpu::ColorTargetState| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("light"),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("cover_picture"),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: Default::default(),
-                depth_stencil: None,
-                multisample: Default::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some("light"),
-                    compilation_options: Default::default(),
-                    targets: &[Some(target)],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
+        let layout = cover::layout(device, "light", &[params, cover::texture_entry(1), cover::texture_entry(2)]);
+        let passes = (&module, "cover_picture", "light");
+        let pipeline_to = |target| cover::pipeline(device, "light", &layout, passes, &[], target);
         let sum = wgpu::ColorTargetState { blend: Some(smooth::ADD), ..smooth::SUM.into() };
         let adding = gpu.can_add().then(|| pipeline_to(sum));
         Self { pipeline: pipeline_to(PICTURE.into()), adding, layout }

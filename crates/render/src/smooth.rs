@@ -5,6 +5,7 @@
 //! What always holds: the places are the same for the same number, spread evenly over the pixel (their mean is its middle where their
 //! number is odd); the last is the middle itself, so that what lies in the G-buffer afterwards is what it is without smoothing.
 
+use crate::cover;
 use crate::gbuffer;
 use crate::light::PICTURE;
 use crate::shader::{self, Target};
@@ -99,45 +100,9 @@ pub(crate) struct SmoothPass {
 impl SmoothPass {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
         let module = shader::module(device, "smooth.wgsl", SOURCE, Target::None);
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("smooth"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-                count: None,
-            }],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("smooth"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("smooth"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cover_picture"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("smoothed"),
-                compilation_options: Default::default(),
-                targets: &[Some(PICTURE.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let layout = cover::layout(device, "smooth", &[cover::texture_entry(0)]);
+        let passes = (&module, "cover_picture", "smoothed");
+        let pipeline = cover::pipeline(device, "smooth", &layout, passes, &[], PICTURE.into());
         Self { pipeline, layout }
     }
 

@@ -8,7 +8,7 @@
 //! renderer that comes with a painter may draw on another thread meanwhile.
 
 use crate::shader::{self, Target};
-use crate::{Gpu, GpuLevel, RenderError, Renderer};
+use crate::{Gpu, GpuLevel, RenderError, Renderer, cover};
 use egui_wgpu::ScreenDescriptor;
 use epaint::image::ImageDelta;
 use epaint::textures::TexturesDelta;
@@ -374,47 +374,10 @@ impl PresentPass {
     fn new(gpu: &Gpu, target: wgpu::TextureFormat) -> Self {
         let device = &gpu.device;
         let module = shader::module(device, "present.wgsl", SOURCE, Target::None);
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("present"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-                count: None,
-            }],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("present"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
+        let layout = cover::layout(device, "present", &[cover::texture_entry(0)]);
         let encode = [("ENCODE", f64::from(u8::from(!gpu.has_view_formats)))];
-        let options = wgpu::PipelineCompilationOptions { constants: &encode, ..Default::default() };
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("present"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cover_window"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("present"),
-                compilation_options: options,
-                targets: &[Some(target.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let passes = (&module, "cover_window", "present");
+        let pipeline = cover::pipeline(device, "present", &layout, passes, &encode, target.into());
         Self { pipeline, layout }
     }
 
