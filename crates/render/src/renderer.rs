@@ -128,8 +128,8 @@ impl Renderer {
     ///
     /// # Errors
     /// [`RenderError::Size`], [`RenderError::Samples`], [`RenderError::ForeignDrawSource`], [`RenderError::CannotBlend`],
-    /// [`RenderError::CannotSmooth`], [`RenderError::NeedsStorage`], [`RenderError::TooMany`] and [`RenderError::Budget`] say what is wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser;
-    /// [`RenderError::DeviceLost`]: [`Renderer::recover`].
+    /// [`RenderError::CannotSmooth`], [`RenderError::NeedsStorage`], [`RenderError::TooMany`] and [`RenderError::Budget`] say what is
+    /// wrong with the frame; [`RenderError::OutOfMemory`]: draw coarser; [`RenderError::DeviceLost`]: [`Renderer::recover`].
     pub fn draw(&mut self, frame: &Frame<'_>) -> Result<(), RenderError> {
         self.submit(frame, false, None)?;
         self.survive(self.gpu.wait())
