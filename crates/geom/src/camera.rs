@@ -119,13 +119,6 @@ impl Camera {
         f64::from(self.size.height) * 0.5 / self.tan_half_fov().y
     }
 
-    /// Sees so many pixels more on all sides; everything is as large as it was.
-    pub fn with_margin(&self, px: u32) -> Self {
-        let size = ImageSize { width: self.size.width + 2 * px, height: self.size.height + 2 * px };
-        let fov_y_rad = 2.0 * libm::atan(f64::from(size.height) * 0.5 / self.focal_px());
-        Self { size, fov_y_rad, ..*self }
-    }
-
     /// Rotation from world axes to view axes (x right, y up, z forward).
     pub fn view_from_world(&self) -> DMat3 {
         DMat3::from_cols(self.right, self.up, self.forward).transpose()
@@ -233,18 +226,6 @@ mod tests {
         let pixel = camera.pixel_of_view_point(in_view);
         let again = camera.eye + camera.ray_through(pixel) * in_view.z;
         assert!((again - point).length() < 1e-12);
-    }
-
-    #[test]
-    fn a_margin_adds_to_all_sides_and_moves_nothing() {
-        let camera = Camera::look_at(DVec3::new(3.0, 2.0, 1.0), DVec3::ZERO, DVec3::Y, 0.6, SIZE);
-        let wider = camera.with_margin(3);
-        assert!((wider.focal_px() - camera.focal_px()).abs() < 1e-9 * camera.focal_px());
-        for point in [DVec3::ZERO, DVec3::new(0.3, -0.2, 0.4)] {
-            let in_view = camera.view_point(point);
-            let moved = wider.pixel_of_view_point(in_view) - camera.pixel_of_view_point(in_view);
-            assert!((moved - 3.0).length() < 1e-9, "{moved}");
-        }
     }
 
     #[test]

@@ -56,7 +56,7 @@ fn main() -> Result<()> {
         let pictures = cameras
             .iter()
             .map(|camera| {
-                let report = scene.select_converged(ViewId(0), &camera.with_margin(1), &Fineness::px(threshold_px));
+                let report = scene.select_converged(ViewId(0), camera, &Fineness::px(threshold_px));
                 let draws =
                     scene.draws(ViewId(0)).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
                 let look = Look { kernel, samples, ..Look::default() };

@@ -16,7 +16,7 @@ pub struct Look {
     /// Light and background.
     pub lighting: Lighting,
     /// At how many places each pixel is looked at, 1 to [`crate::MOST_SAMPLES`]: a frame takes as many times as long, and its edges are as
-    /// much smoother. Depths are those of the pixels' middles. What is drawn is to be cut for a picture a pixel larger all around.
+    /// much smoother. Depths are those of the pixels' middles.
     pub samples: u32,
 }
 

@@ -13,7 +13,6 @@ mod smooth;
 use crate::clock::thread_cpu_ms;
 use crate::mailbox::{Figures, Mail, Mailbox, ModelKey, News, Order, Wish};
 use crate::settings::Settings;
-use gigalod_geom::Camera;
 use gigalod_render::{Frame, Look, RenderError, Renderer};
 use gigalod_runtime::residency::ThreadedLoader;
 use gigalod_runtime::{
@@ -149,7 +148,9 @@ impl Stage {
                 continue;
             }
             if !self.changed && self.control.is_settled() {
-                self.smooth(number, &wish);
+                if !self.is_smooth {
+                    self.smooth(number, &wish);
+                }
                 continue;
             }
             if !self.changed && self.waits_for_pages() && self.scene.residency_mut().receive(false) == 0 {
@@ -216,7 +217,6 @@ impl Stage {
         let (begun, cpu_begun) = (Instant::now(), thread_cpu_ms());
         let moved = self.changed;
         (self.cut, self.is_smooth) = (None, false);
-        let seen = seen(wish);
         self.control.share(self.painting_ms);
         let wanted = self.control.next(moved);
         let room = self.renderer.most_splats(wish.camera.size, &wish.look);
@@ -224,10 +224,10 @@ impl Stage {
         self.scene.residency_mut().receive(false);
         let report = if moved {
             // A moving frame is short, and breaking it off would show nothing at all.
-            self.scene.select(CAMERA, &seen, &fineness)
+            self.scene.select(CAMERA, &wish.camera, &fineness)
         } else {
             let interrupt = self.mailbox.interrupt().clone();
-            match self.scene.select_interruptible(CAMERA, &seen, &fineness, &interrupt) {
+            match self.scene.select_interruptible(CAMERA, &wish.camera, &fineness, &interrupt) {
                 Some(report) => report,
                 None => {
                     self.scene.serve();
@@ -336,11 +336,6 @@ impl Stage {
         }
         problems
     }
-}
-
-/// What is cut for: what is looked at beside the middles of pixels may lie a little beside the picture.
-fn seen(wish: &Wish) -> Camera {
-    wish.camera.with_margin(u32::from(wish.look.samples > 1))
 }
 
 /// Median diameter of what is drawn, in pixels of the screen across the view axis, of a sample; 0 where nothing is.

@@ -117,20 +117,18 @@ impl Stage {
         console: &Console,
     ) -> Result<Drawn<T>, CliError> {
         let mut losses = 0;
-        // What is looked at beside the middles of pixels may lie a little beside the picture.
-        let seen = camera.with_margin(u32::from(look.samples > 1));
         loop {
             let room = self.renderer.most_splats(camera.size, &look);
             let most_splats = wanted.most_splats.min(self.most_splats).min(room);
             let fineness = Fineness { most_splats, ..*wanted };
             if wait == Wait::Converged {
                 // Then once more with everything there: the time that a warm cut takes.
-                self.scene.select_converged(CAMERA, &seen, &fineness);
+                self.scene.select_converged(CAMERA, camera, &fineness);
                 self.expect_all_models()?;
             }
             let begun = Instant::now();
             self.scene.residency_mut().receive(false);
-            let report = self.scene.select(CAMERA, &seen, &fineness);
+            let report = self.scene.select(CAMERA, camera, &fineness);
             let select_ms = begun.elapsed().as_secs_f64() * 1e3;
             let pixel_edge_px = match &mut self.control {
                 Some(control) => control.pixel_edge_px(&report, select_ms, self.scene.area_px(CAMERA, camera)),

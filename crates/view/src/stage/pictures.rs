@@ -5,7 +5,7 @@
 //! What always holds: a picture is as fine as what it was asked with allows, whatever a person does meanwhile: as they come first, it
 //! is drawn when they rest, at the latest when the viewer ends.
 
-use super::{CAMERA, LOOK_FOR_PAGES, Stage, seen};
+use super::{CAMERA, LOOK_FOR_PAGES, Stage};
 use crate::mailbox::{News, Wish};
 use gigalod_render::{Frame, RenderError};
 use gigalod_runtime::Fineness;
@@ -56,7 +56,7 @@ impl Stage {
         self.scene.set_tint(wish.tint);
         self.cut = None;
         loop {
-            let report = self.scene.select_interruptible(CAMERA, &seen(wish), &fineness, &interrupt);
+            let report = self.scene.select_interruptible(CAMERA, &wish.camera, &fineness, &interrupt);
             self.scene.serve();
             if report.is_none() {
                 return false;
