@@ -144,7 +144,7 @@ proptest! {
                 prop_assert_eq!(report.limited_by, Some(Limit::Budget));
             }
             // A little finer, and there would be too many. What hides its back is counted although it is not drawn.
-            let finer = plain_of(&scene, &pose, (report.threshold_px * 0.7).min(1e9), Cutting::default()).report;
+            let finer = plain_of(&scene, &pose, (report.threshold_px / 1.07).min(1e9), Cutting::default()).report;
             let slack = 20 + finer.culled_backface;
             prop_assert!(finer.drawn + slack > fineness.most_splats, "{} at {}", finer.drawn, report.threshold_px);
             let mut expected = plain_of(&scene, &pose, report.threshold_px, Cutting::default());

@@ -182,14 +182,15 @@ impl FrameRate {
         let usual_px = threshold_px / THRESHOLD_TO_DIAMETER;
         let area_px = self.area_px.unwrap_or(splats * usual_px * usual_px * std::f64::consts::FRAC_PI_4);
         let edge_step = if self.resting { 0 } else { self.edge_step };
-        // An empty picture is drawn by other means.
-        if report.drawn > 0 {
-            self.cost.learn(&Work::new(splats, area_px, edge_px(edge_step)), frame_ms - self.cut_ms);
-            let cut_splat_ms = self.cut_ms / splats.max(USUAL_SPLATS);
-            self.cut_splat_ms += CUT_GAIN * (cut_splat_ms - self.cut_splat_ms);
-        }
         // Where a budget does not allow the finest, this is as fine as it gets.
         self.settled = self.resting && self.asked_px <= self.finest_px && !loading;
+        // An empty picture is drawn by other means, and what turns into view after it is not known to be little.
+        if report.drawn == 0 {
+            return;
+        }
+        self.cost.learn(&Work::new(splats, area_px, edge_px(edge_step)), frame_ms - self.cut_ms);
+        let cut_splat_ms = self.cut_ms / splats.max(USUAL_SPLATS);
+        self.cut_splat_ms += CUT_GAIN * (cut_splat_ms - self.cut_splat_ms);
         if self.resting {
             return;
         }

@@ -75,6 +75,18 @@ fn it_holds_the_target_on_any_machine_and_through_a_sudden_turn() {
 }
 
 #[test]
+fn what_turns_out_of_view_and_back_is_asked_for_as_it_was() {
+    let mut machine = Machine { picture_ms: 5.0, splat_ms: 1e-4, ..Machine::default() };
+    let mut control = FrameRate::new(100.0, 1.0);
+    let before = (0..30).map(|_| machine.draw(&mut control, view(2e7), true).px).last().expect("frames");
+    for frame in 0..50 {
+        machine.draw(&mut control, view(0.0), frame % 3 > 0);
+    }
+    // Finer, and the cut of the whole would be in vain.
+    assert_eq!(control.next(true).threshold_px, before);
+}
+
+#[test]
 fn at_rest_the_threshold_only_falls_and_ends_at_the_finest() {
     let mut machine = Machine { picture_ms: 10.0, splat_ms: 1e-3, noise: 0.1, ..Machine::default() };
     let mut control = FrameRate::new(50.0, 1.0);

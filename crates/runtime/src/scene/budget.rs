@@ -7,12 +7,48 @@
 use super::{Instance, Lists, Scene};
 use crate::residency::{ModelFile, PageRequest};
 use crate::selection::{Outcome, SelectInput, Selector, Target};
-use crate::splats::{SplatList, coarser};
+use crate::splats::{SplatList, coarser, finer_by};
 use crate::{CutReport, Fineness, Interrupt, Limit, ModelView, ViewId};
 use gigalod_geom::Camera;
 
 /// Lists grow by at least so much at a time.
 const LEAST_GROWTH_BYTES: u64 = 64 << 10;
+
+/// Thresholds are searched from so many times the one asked for or a pixel, where nothing is known.
+const FIRST_SEARCHED: f32 = 16.0;
+
+/// A cut of fewer primitives than this part of what there may be says nothing about one of as many: 1 over
+const LITTLE: u64 = 4;
+
+/// So many times what there may be is expected, where a cut is not even tried.
+const SURELY_TOO_MANY: f64 = 1.15;
+
+/// After so many counts, the next one is from the threshold asked for.
+const MOST_COUNTS: u32 = 4;
+
+/// What a view's last cut came to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LastCut {
+    threshold_px: f32,
+    primitives: u64,
+}
+
+impl LastCut {
+    /// Primitives at another threshold: on a surface, they grow with its minus second power.
+    fn expected_at(&self, threshold_px: f32) -> f64 {
+        self.primitives as f64 * (f64::from(self.threshold_px) / f64::from(threshold_px)).powi(2)
+    }
+
+    /// A threshold that is probably a little too fine for so many primitives.
+    fn expected_px(&self, most_splats: u64) -> f32 {
+        self.threshold_px * finer_by(self.primitives, most_splats)
+    }
+}
+
+/// Where a search begins that knows nothing.
+fn first_searched_px(asked_px: f32) -> f32 {
+    FIRST_SEARCHED * asked_px.max(1.0)
+}
 
 impl Scene {
     /// A cut of all instances. With `beside`, the last one stays where it is until this one is complete.
@@ -30,28 +66,24 @@ impl Scene {
         let asked_px = fineness.threshold_px;
         let most_splats = fineness.most_splats.min(self.most_splats_in_memory());
         let mut threshold_px = asked_px;
-        // The search begins as the cut does, so it may come first where the cut will probably be in vain.
-        let mut searched = self.limited.contains(&view);
+        // A cut in vain takes as long as another, so the search comes first where it will probably be.
+        let mut searched = self.is_probably_too_fine(view, camera, asked_px, most_splats, interrupt)?;
         if searched {
-            threshold_px = self.threshold_within(camera, asked_px, most_splats, interrupt)?;
+            threshold_px = self.threshold_within(view, camera, asked_px, most_splats, interrupt)?;
         }
         let mut report = loop {
             match self.cut_at(view, camera, threshold_px, most_splats, interrupt, beside) {
                 Ok(report) => break report,
                 Err(Outcome::TooMany) if !searched => {
                     searched = true;
-                    threshold_px = self.threshold_within(camera, asked_px, most_splats, interrupt)?;
+                    threshold_px = self.threshold_within(view, camera, asked_px, most_splats, interrupt)?;
                 }
                 Err(Outcome::NoRoom) if self.make_room_for_lists() => {}
                 Err(Outcome::TooMany | Outcome::NoRoom) => threshold_px = coarser(threshold_px),
                 Err(_) => return None,
             }
         };
-        if threshold_px > asked_px {
-            self.limited.insert(view);
-        } else {
-            self.limited.remove(&view);
-        }
+        self.last.insert(view, LastCut { threshold_px, primitives: report.primitives() });
         let limit = |report: &mut CutReport| {
             if threshold_px > asked_px && report.max_error_px > asked_px {
                 report.limited_by = Some(Limit::Budget);
@@ -124,20 +156,70 @@ impl Scene {
         Ok(report)
     }
 
+    /// True where a cut at `asked_px` is expected to have more than `most_splats`. `None` where it was broken off.
+    fn is_probably_too_fine(
+        &mut self,
+        view: ViewId,
+        camera: &Camera,
+        asked_px: f32,
+        most_splats: u64,
+        interrupt: &Interrupt,
+    ) -> Option<bool> {
+        if most_splats == u64::MAX {
+            return Some(false);
+        }
+        let expected = match self.telling_cut(view, most_splats) {
+            Some(last) => last.expected_at(asked_px),
+            // What has just turned into view is told by a count that takes no time beside a cut.
+            None => {
+                let threshold_px = first_searched_px(asked_px);
+                self.count_from(threshold_px, camera, most_splats, interrupt)?;
+                LastCut { threshold_px, primitives: self.search.drawn() }.expected_at(asked_px)
+            }
+        };
+        Some(expected > most_splats as f64 * SURELY_TOO_MANY)
+    }
+
+    /// The last cut, unless it was of so little that it tells nothing about the next one.
+    fn telling_cut(&self, view: ViewId, most_splats: u64) -> Option<LastCut> {
+        let tells = |last: &LastCut| last.threshold_px.is_finite() && last.primitives >= most_splats / LITTLE;
+        self.last.get(&view).copied().filter(tells)
+    }
+
     /// The threshold at which a camera sees no more than `most_splats`. `None` where the search was broken off.
+    ///
+    /// A count from a threshold upwards takes as long as a cut there. So the first ones are made from coarse ones, or from where the
+    /// last cut points to, and tell about where to go on; the answer is that of a count from `asked_px`.
     fn threshold_within(
         &mut self,
+        view: ViewId,
         camera: &Camera,
         asked_px: f32,
         most_splats: u64,
         interrupt: &Interrupt,
     ) -> Option<f32> {
-        self.search.begin(asked_px, most_splats);
+        let last_px = self.telling_cut(view, most_splats).map(|last| last.expected_px(most_splats));
+        let mut from_px = last_px.unwrap_or_else(|| first_searched_px(asked_px)).max(asked_px);
+        for count in 1.. {
+            self.count_from(from_px, camera, most_splats, interrupt)?;
+            match self.search.finer_px() {
+                Some(finer_px) if from_px > asked_px => {
+                    from_px = if count < MOST_COUNTS { finer_px.max(asked_px) } else { asked_px };
+                }
+                _ => break,
+            }
+        }
+        Some(self.search.threshold_px())
+    }
+
+    /// Counts what thresholds of `from_px` and above draw. `None` where it was broken off.
+    fn count_from(&mut self, from_px: f32, camera: &Camera, most_splats: u64, interrupt: &Interrupt) -> Option<()> {
+        self.search.begin(from_px, most_splats);
         for Instance { file, placement } in self.instances.values() {
             let input = SelectInput {
                 file: *file,
                 view: ModelView::new(camera, placement),
-                threshold_px: asked_px,
+                threshold_px: from_px,
                 most_splats,
                 room_bytes: 0,
                 interrupt,
@@ -151,7 +233,7 @@ impl Scene {
                 return None;
             }
         }
-        Some(self.search.threshold_px())
+        Some(())
     }
 
     /// Bytes of lists, and of what makes them.

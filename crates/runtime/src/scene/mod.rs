@@ -7,8 +7,9 @@ use crate::residency::{FileId, PageRequest, Residency};
 use crate::selection::{DrawSource, Selection, Selector, Target};
 use crate::splats::{ThresholdSearch, Tint};
 use crate::{CutReport, Fineness, HybridSelector, InstanceId, Interrupt, ModelView, Similarity, SplatSelector, ViewId};
+use budget::LastCut;
 use gigalod_geom::{Aabb, Camera};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// One placement of one file.
 #[derive(Clone, Copy, Debug)]
@@ -33,8 +34,8 @@ pub struct Scene {
     /// For pages, lists, and all else that the scene keeps.
     cpu_budget: u64,
     search: ThresholdSearch,
-    /// Views whose last cut had a raised threshold.
-    limited: BTreeSet<ViewId>,
+    /// Of each view.
+    last: BTreeMap<ViewId, LastCut>,
     never: Interrupt,
 }
 
@@ -59,7 +60,7 @@ impl Scene {
             requests: Vec::new(),
             cpu_budget: u64::MAX,
             search: ThresholdSearch::new(),
-            limited: BTreeSet::new(),
+            last: BTreeMap::new(),
             never: Interrupt::default(),
         }
     }

@@ -27,7 +27,7 @@ use gigalod_geom::color::rgb565_of_srgb8;
 use gigalod_geom::projected;
 use gigalod_geom::quantise::normal;
 use lanes::Look;
-pub(crate) use sizes::{ThresholdSearch, coarser};
+pub(crate) use sizes::{ThresholdSearch, coarser, finer_by};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::sync::{Mutex, PoisonError};
@@ -49,6 +49,9 @@ pub const MATERIAL_SRGB: [u8; 3] = [197, 190, 173];
 /// Nodes of a target's last cut from which on the next one is worth several threads: about a millisecond of one.
 const WORTH_THREADS: u64 = 50_000;
 
+/// Each cut forgets one part of so many of what those before it needed: half of it in 44 frames.
+const FORGOTTEN: u64 = 64;
+
 /// Chunks of work for each thread: the more, the shorter the wait for the last one.
 const CHUNKS_PER_THREAD: usize = 8;
 
@@ -64,7 +67,7 @@ pub struct SplatSelector {
     pub tint: Tint,
     threads: usize,
     crew: Option<Crew>,
-    /// Nodes that the last cut of a target visited.
+    /// Nodes that cuts of a target visited lately: what turns out of view may turn back.
     visited: BTreeMap<Target, u64>,
     // Kept so that a warm cut allocates nothing.
     items: Vec<Item>,
@@ -124,6 +127,7 @@ impl SplatSelector {
             cut.chunks = chunks.min(items.len()) as u32;
             cut.items = items;
         }
+        let together = together && cut.items.len() > 1;
         crew.work(cut, together)
     }
 }
@@ -135,14 +139,14 @@ impl Selector for SplatSelector {
             DrawSource::Hybrid(_) | DrawSource::OnDevice(_) => SplatList::default(),
         };
         out.requests.clear();
-        let visited = self.visited.entry(target).or_default();
-        let together = *visited >= WORTH_THREADS;
+        let visited = self.visited.get(&target).copied().unwrap_or_default();
+        let together = visited >= WORTH_THREADS;
         let mut outcome = self.cut_into(input, together, out, &mut list);
         if out.report.inconsistent && together {
             // Where it was cut short depends on who saw it first; alone, it is always the same place.
             outcome = self.cut_into(input, false, out, &mut list);
         }
-        self.visited.insert(target, out.report.visited);
+        self.visited.insert(target, out.report.visited.max(visited - visited / FORGOTTEN));
         out.draw = DrawSource::Splats(list);
         outcome
     }
@@ -159,11 +163,12 @@ impl SplatSelector {
         self.free.extend(list.pieces.drain(..).filter(|piece| piece.room() > 0));
     }
 
-    /// Gives memory away that the next lists will not need, unless they have grown by much: after lists of `used` pieces that
+    /// Gives memory away, bit by bit, that the next lists will not need, unless they grow by much: after lists of `used` pieces that
     /// were made of the same memory, or beside it.
     pub(crate) fn give_away(&mut self, used: usize, beside: bool) {
         let enough = used / 4 + 2 + if beside { used } else { 0 };
-        self.free.truncate(enough);
+        let kept = self.free.len() - self.free.len().div_ceil(FORGOTTEN as usize);
+        self.free.truncate(enough.max(kept));
     }
 
     /// Keeps a few empty pieces, so that a list that grows a little needs no memory.

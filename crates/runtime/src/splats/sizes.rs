@@ -7,7 +7,8 @@
 //! A node below ancestors of at least m pixels is drawn or opened where the threshold is below m. So each group of k nodes in
 //! view adds k − 1 splats to every threshold below its m, and one traversal that counts them by m answers for all thresholds from
 //! its own upwards. It need not finish at its own: as soon as too many are counted, its threshold is raised to where they are not,
-//! and what is below is not visited. So it visits a few times as many nodes as the cut will.
+//! and what is below is not visited. From a threshold far too fine, most of the time goes to where it begins; so a search is a few
+//! counts, from coarse thresholds first ([`ThresholdSearch::finer_px`]), and together they visit about as many nodes as the cut will.
 
 use super::group::{Below, Group, Inconsistent, Stored, ones};
 use super::lanes::Look;
@@ -21,6 +22,15 @@ const STEPS: usize = 52 << STEP_BITS;
 const STEP_BITS: u32 = 4;
 const SHIFT: u32 = 23 - STEP_BITS;
 const FIRST: u32 = (127 - 20) << STEP_BITS;
+
+/// The ratio to a threshold that draws `drawn` primitives of one that probably draws a little more than `most` of them.
+///
+/// On a surface, the number grows with the threshold's minus second power, and more slowly where data end. So the farther away, the more
+/// is added: a count raises its threshold, never lowers it.
+pub(crate) fn finer_by(drawn: u64, most: u64) -> f32 {
+    let ratio = (drawn.max(1) as f64 / most.max(1) as f64).sqrt();
+    (0.97 * ratio.powf(if ratio < 1.0 { 1.1 } else { 1.0 })) as f32
+}
 
 /// The last step whose threshold is not above `px` ≥ 0.
 fn step(px: f32) -> usize {
@@ -84,6 +94,18 @@ impl ThresholdSearch {
     /// The threshold at which what was counted so far is not too much.
     pub(crate) fn threshold_px(&self) -> f32 {
         self.threshold_px
+    }
+
+    /// Where to look for a finer threshold that is not too much, once all is counted. `None` where there is no finer one.
+    pub(crate) fn finer_px(&self) -> Option<f32> {
+        self.raised
+            .is_none()
+            .then(|| self.threshold_px * finer_by(self.drawn, self.most_splats).clamp(1.0 / 16.0, 0.95))
+    }
+
+    /// Splats, triangles and points at the threshold; too many, where it was raised.
+    pub(crate) fn drawn(&self) -> u64 {
+        self.drawn
     }
 
     /// Counts a hierarchy of which nothing is resident.
