@@ -73,7 +73,7 @@ fn judge(octree: &Octree, camera: &Camera, node: NodeId) -> Judged {
     let (tan, geo) = (camera.tan_half_fov(), f64::from(record.error_geo));
     let below = if record.children > 0 { f64::from(record.error_total) } else { 0.0 };
     let spacing = f64::from(record.spacing);
-    let padded = corners(&octree.root, record, camera, geo + below + spacing * 0.5f64.sqrt());
+    let padded = corners(&octree.root, record, camera, geo + below + spacing * 0.5);
     let sides: [fn(DVec3, f64, f64) -> f64; 5] = [
         |at, x, _| at.z * x + at.x,
         |at, x, _| at.z * x - at.x,
@@ -97,8 +97,7 @@ fn judge(octree: &Octree, camera: &Camera, node: NodeId) -> Judged {
     let max = min + DVec3::from_array(record.extent_steps.map(f64::from)) * step + 2.0 * around;
     let nearest = (camera.eye.clamp(min, max) - camera.eye).length();
     let depth = depth.max(nearest / slope.hypot(1.0));
-    let drawn = f64::from(record.error_total) + if record.points > 0 { spacing * 0.5f64.sqrt() } else { 0.0 };
-    let error_px = projected::shift_px(slope, depth, drawn, camera.focal_px());
+    let error_px = projected::shift_px(slope, depth, f64::from(record.error_total), camera.focal_px());
     Judged { is_outside, error_px }
 }
 

@@ -7,10 +7,11 @@
 //!
 //! What always holds: the `geo` of a point for good bounds how far away anything is that it stands for. Where corners take a face's place,
 //! each is as near to the original as the face was, and each point of the face is within half the node's spacing of one of them, so
-//! squares as wide as the spacing cover it. They are narrower than twice the error, so than a pixel, where the error is half a pixel.
+//! discs as wide as the spacing cover it. Such a face has room for that: its error and half the spacing together are within the node's.
 //!
 //! Source: the hybrid paper, section 3.2. Differs: it replaces a triangle by up to six points of a grid, which move; corners stay where they
-//! are and are shared, half as many as triangles.
+//! are and are shared, half as many as triangles. Its points may be as wide as two errors, on top of their own; ours claim no more than
+//! triangles do.
 
 use super::patch::{Face, Patch, Spot, Vertex, total};
 use super::simplify::up;
@@ -21,10 +22,9 @@ use std::hash::BuildHasherDefault;
 
 /// Edge of the cubes within which points become one, as a share of the limit: nothing moves by half the limit.
 const CUBE: f64 = 0.28;
-/// How far from its nearest corner a point of a face may be, in parts of the error: half the width that points are drawn with. A pixel is
-/// twice the error that is allowed by default, so there 1 would do as well; but at coarser ones squares show (dragon at 8 px: 20 dB beside
-/// the ray tracer with 1, 25 with 0.7, 26 with 0.5 and a fifth of the points).
-const MOST_REACH: f64 = 0.7;
+/// How far from its nearest corner a point of a face may be, in parts of the error, to choose from for each node: wider points take
+/// larger triangles' place, and leave less room for errors of their own.
+const REACHES: [f64; 5] = [0.5, 0.4, 0.3, 0.2, 0.1];
 /// A corner becomes a point where so many of its triangles are small enough; a few alone would be more points than triangles.
 const LEAST_AROUND: u32 = 4;
 
@@ -82,7 +82,8 @@ fn components(patch: &Patch, limit: f64) -> Vec<(Spot, Vec<u32>)> {
         let held = component.iter().map(|(_, face)| patch.faces[*face as usize]);
         let (geo, app) = held.fold((0.0f32, 0.0f32), |(geo, app), face| (geo.max(face.geo), app.max(face.app)));
         let geo = up(f64::from(geo) + reach * (1.0 + 1e-9));
-        if f64::from(total(geo, app)) > limit {
+        // It is drawn as wide as it was.
+        if f64::from(total(geo, app)) + reach > limit {
             continue;
         }
         let looks = corners().map(|corner| &patch.vertices[corner as usize]);
@@ -119,11 +120,11 @@ fn merge(spots: &mut Vec<Spot>, limit: f64) {
         let moved = |spot: &Spot, most: f32| up(f64::from(most) + (spot.vertex.at - middle).length() * (1.0 + 1e-9));
         let geo = group.iter().fold(0.0f32, |most, spot| most.max(moved(spot, spot.geo)));
         let app = group.iter().fold(0.0f32, |most, spot| most.max(spot.app));
-        if group.len() == 1 || f64::from(total(geo, app)) > limit {
+        let reach = group.iter().fold(0.0f32, |most, spot| most.max(moved(spot, spot.reach)));
+        if group.len() == 1 || f64::from(total(geo, app)) + f64::from(reach) > limit {
             spots.extend(group);
             continue;
         }
-        let reach = group.iter().fold(0.0f32, |most, spot| most.max(moved(spot, spot.reach)));
         let normal: Vec3 = group.iter().map(|spot| spot.vertex.normal).sum();
         let normal = normal.try_normalize().unwrap_or(group[0].vertex.normal);
         let color = group.iter().map(|spot| spot.vertex.color).sum::<Vec3>() / count as f32;
@@ -143,16 +144,24 @@ pub(super) struct Small {
 }
 
 impl Small {
-    /// `error` is the node's largest.
-    pub(super) fn of(patch: &Patch, error: f64) -> Self {
-        let reach = |face: &Face| {
+    /// `error` is the node's largest; by `moved` a vertex is moved when it is rounded.
+    pub(super) fn of(patch: &Patch, error: f64, moved: impl Fn(u32) -> f64) -> Self {
+        // How far a face's points are from their nearest corner at most, and what its corners are off.
+        let tell = |face: &Face| {
             let [a, b, c] = face.corners.map(|corner| patch.vertices[corner as usize].at);
             let longest = (a - b).length_squared().max((b - c).length_squared()).max((c - a).length_squared());
+            let moved = face.corners.map(&moved).into_iter().fold(0.0, f64::max);
             // No point of a triangle is farther from its nearest corner than of a regular one with this edge.
-            (longest / 3.0).sqrt()
+            ((longest / 3.0).sqrt() + moved, f64::from(total(up(f64::from(face.geo) + moved), face.app)))
         };
-        let fits = |face: &Face| Some(reach(face)).filter(|reach| *reach <= MOST_REACH * error);
-        let mut small = Self { reaches: patch.faces.iter().map(fits).collect(), ..Self::default() };
+        let told: Vec<(f64, f64)> = patch.faces.iter().map(tell).collect();
+        let fits = |most: f64| move |(reach, own): &(f64, f64)| *reach <= most && own + most <= error;
+        let count = |most: f64| told.iter().filter(|face| fits(most)(face)).count();
+        // The first of those with the most faces.
+        let most = REACHES.map(|part| part * error).into_iter().rev().max_by_key(|most| count(*most));
+        let fits = fits(most.expect("there are some"));
+        let reaches = told.iter().map(|face| fits(face).then_some(face.0)).collect();
+        let mut small = Self { reaches, ..Self::default() };
         let mut around = vec![0u32; patch.vertices.len()];
         for (face, _) in patch.faces.iter().zip(&small.reaches).filter(|(_, reach)| reach.is_some()) {
             face.corners.iter().for_each(|corner| around[*corner as usize] += 1);

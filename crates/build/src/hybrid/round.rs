@@ -36,21 +36,22 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     let room = cell.edge(shape.edge) / f64::from(shape.resolution);
     let small = match place {
         Place::Leaf => Small::default(),
-        Place::Above => Small::of(patch, room),
+        Place::Above => Small::of(patch, room, moved),
     };
-    let mut errors = Errors::default();
+    let (mut errors, mut points_errors) = (Errors::default(), Errors::default());
     let mut cone = Cone::default();
     let mut names = Names { names: vec![u32::MAX; patch.vertices.len()], used: Vec::new() };
     let mut page = Page::default();
     let mut flattened = Vec::new();
     for (number, face) in patch.faces.iter().enumerate() {
         let corners = face.corners.map(|corner| steps[corner as usize]);
-        let geo = f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max);
-        errors.add(up(geo), face.app);
+        let geo = up(f64::from(face.geo) + face.corners.map(moved).into_iter().fold(0.0, f64::max));
         if let Some(Some(_)) = small.reaches.get(number) {
+            points_errors.add(geo, face.app);
             cone.add(corners);
             continue;
         }
+        errors.add(geo, face.app);
         let [a, b, c] = corners;
         if a == b || b == c || c == a {
             flattened.push((corners, face));
@@ -82,20 +83,22 @@ pub(super) fn round(patch: &Patch, cell: Cell, shape: &Shape, place: Place) -> M
     }
     let mut reach = small.reach;
     for (at, face) in &bare.points {
-        // Its error was counted with all faces'.
-        reach = reach.max(face.corners.map(moved).into_iter().fold(0.0, f64::max));
+        let moved = face.corners.map(moved).into_iter().fold(0.0, f64::max);
+        points_errors.add(up(f64::from(face.geo) + moved), face.app);
+        reach = reach.max(moved);
         cone.add_any();
         placed.push((*at, patch.vertices[face.corners[0] as usize]));
     }
     for spot in &patch.spots {
         let at = grid(spot.vertex.at);
         let away = away(at, spot.vertex.at);
-        errors.add(up(f64::from(spot.geo) + away), spot.app);
+        points_errors.add(up(f64::from(spot.geo) + away), spot.app);
         cone.add_any();
         reach = reach.max(f64::from(spot.reach) + away);
         placed.push((at, spot.vertex));
     }
     let points = placed.len() - vertices;
+    errors.add_points(&points_errors, reach);
     let (min_steps, extent_steps) = fill(&mut page, &placed, shape);
     let (cone_axis, cone_sine) = cone.finish();
     let record = NodeRecord {
@@ -192,6 +195,13 @@ impl Errors {
     fn add(&mut self, geo: f32, app: f32) {
         self.geo = self.geo.max(geo);
         self.total = self.total.max(total(geo, app));
+    }
+
+    /// Adds those of points: what is drawn of them reaches farther than they are.
+    fn add_points(&mut self, points: &Self, reach: f64) {
+        self.geo = self.geo.max(points.geo);
+        // The file's spacing is rounded up, to 16 bits.
+        self.total = self.total.max(up(f64::from(points.total) + reach * (1.0 + 1.0 / 16384.0)));
     }
 }
 

@@ -166,7 +166,7 @@ impl<'a> Seen<'a> {
             let px = camera.pixel_of_view_point(view);
             window = [window[0].min(px), window[1].max(px)];
         }
-        // Points are a pixel wide, and places are rounded.
+        // Places are rounded.
         [window[0] - 2.0, window[1] + 2.0]
     }
 }

@@ -1,13 +1,15 @@
 // Points and lines on the screen, shared by all hybrid passes.
 //
-// A point is a square around where it is, as wide as the node's points are apart, at least a pixel: so it covers a pixel's centre
-// exactly where squares of neighbours do not. Its depth is its own.
+// A point is a ball that is as wide as its node's spacing. What points stand for lies in their balls, so these cover a pixel's centre
+// wherever that does, however small they are. The depth is the middle's.
 //
 // A line is what lies near a border edge: as far as its node's error (and a bit, for neighbours' rounding), so that it covers whatever gap may be there.
 // It lies a little behind the edge, so that it does not show in front of surfaces that recede, and by less than the node's error.
 
 // Vertices are rounded by up to this on the screen, in pixels.
 const ROUNDING_PX: f32 = 0.003;
+// Radius of a ball in its distance; one that is larger covers whatever is beyond it.
+const MOST_BALL: f32 = 0.9;
 // How far behind its edge a line lies, in half widths.
 const BEHIND: f32 = 0.25;
 
@@ -41,7 +43,11 @@ fn point_of(node: Node, index: u32) -> Spot {
         return out;
     }
     out.a = px_of(view, per_z);
-    out.half_px = vec2f(max(0.5, 0.5 * node.spacing * (frame.focal_px * per_z)));
+    // A ball is an ellipse in the picture, longer towards its edges, and its middle is a little nearer to them than that of the ellipse.
+    let wide = min(0.5 * node.spacing * per_z, MOST_BALL);
+    let slope_squared = dot2(view.xy, view.xy) * (per_z * per_z);
+    let stretched = (sqrt(1.0 + slope_squared) + sqrt(slope_squared) * wide) * (1.0 / (1.0 - wide * wide));
+    out.half_px = vec2f(wide * frame.focal_px * stretched + ROUNDING_PX);
     out.per_z = vec2f(per_z);
     out.window = window_of_px(out.a - out.half_px.x, out.a + out.half_px.x);
     return out;
@@ -102,7 +108,8 @@ fn depth_of_line(line: Spot, pixel: vec2i) -> f32 {
 // Depth of a point or line in a pixel of its window; 0 where it is not.
 fn depth_of_spot(spot: Spot, pixel: vec2i) -> f32 {
     if kind == POINTS {
-        return 1.0 / spot.per_z.x;
+        let away = vec2f(pixel) + 0.5 - spot.a;
+        return select(0.0, 1.0 / spot.per_z.x, dot2(away, away) <= spot.half_px.x * spot.half_px.x);
     }
     return depth_of_line(spot, pixel);
 }

@@ -12,8 +12,8 @@ use gigalod_geom::cone::NormalCone;
 use gigalod_geom::projected;
 use glam::DVec3;
 
-/// A point is drawn as a square at least `spacing` wide; so far it reaches, in spacings.
-pub(super) const POINT_REACH: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// A point is drawn as a disc that is `spacing` wide; so far it reaches, in spacings.
+pub(super) const POINT_REACH: f64 = 0.5;
 
 /// A hierarchy as one view sees it.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub(super) struct Look<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sight {
     pub(super) node: u32,
-    /// [`drawn_error`], projected: how far off on the screen it may be drawn.
+    /// `error_total`, projected: how far off on the screen it may be drawn.
     pub(super) error_px: f32,
 }
 
@@ -106,8 +106,8 @@ impl<'a> Look<'a> {
             return None;
         }
         // Whatever does not compare is as bad as can be.
-        let shown = half + geo + f64::from(record.spacing).max(0.0) * 0.5;
-        let error_px = self.error_px(center, shown, drawn_error(record)) as f32;
+        let shown = half + geo + f64::from(record.spacing).max(0.0) * POINT_REACH;
+        let error_px = self.error_px(center, shown, f64::from(record.error_total)) as f32;
         Some(Sight { node, error_px: if error_px.is_nan() { f32::INFINITY } else { error_px } })
     }
 
@@ -181,13 +181,6 @@ impl<'a> Look<'a> {
         };
         side(self.right, width) * side(self.up, height)
     }
-}
-
-/// How far from the original something of a node may be drawn; model units. Points are squares, and their corners are farther off than the
-/// points themselves.
-pub(super) fn drawn_error(record: &NodeRecord) -> f64 {
-    let corner = if record.points > 0 { f64::from(record.spacing).max(0.0) * POINT_REACH } else { 0.0 };
-    f64::from(record.error_total) + corner
 }
 
 /// 2 to this, as exactly as there are numbers.

@@ -4,7 +4,7 @@
 //! is sound, as that is. It takes some nanoseconds a triangle, so it is for the few nodes around the eye ([`Look::is_near`]) that have
 //! nothing finer below.
 
-use super::look::{Look, NodeBox, POINT_REACH, drawn_error};
+use super::look::{Look, NodeBox, POINT_REACH};
 use gigalod_format::hybrid::{NodeRecord, Page};
 use glam::DVec3;
 
@@ -37,7 +37,7 @@ impl Look<'_> {
                 nearest = nearest.min(point.length() - off - wide);
             }
         }
-        self.error_px_beyond(nearest, drawn_error(record))
+        self.error_px_beyond(nearest, f64::from(record.error_total))
     }
 }
 

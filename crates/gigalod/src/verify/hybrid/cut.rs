@@ -51,8 +51,8 @@ impl Cut {
                 let at = places(page, record, skeleton);
                 let (vertices, dots) = at.split_at(record.vertices as usize);
                 surface.add(*node, 0.0, vertices, &page.triangles);
-                // A disc around the square that it is drawn as.
-                let reach = f64::from(record.spacing) * 0.5 * std::f64::consts::SQRT_2;
+                // The ball that is drawn.
+                let reach = f64::from(record.spacing) * 0.5;
                 let each: Vec<[u32; 3]> = (0..dots.len() as u32).map(|dot| [dot; 3]).collect();
                 points.add(*node, reach, dots, &each);
             }
