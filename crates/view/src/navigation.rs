@@ -6,7 +6,8 @@
 //!
 //! What always holds, whatever goes in: the pose is finite; the eye is neither farther away than [`FARTHEST`] views of the whole
 //! nor nearer to its pivot than [`NEAREST`] of the diagonal; and of the *anchors*, balls that hold a part of the model's surface, at
-//! least one is wholly in the picture, so that nobody loses the model. What would break that is done as far as it does
+//! least one is wholly in the picture, so that nobody loses the model; a pose that was given in numbers may look at any place within the
+//! model's bounds. What would break that is done as far as it does
 //! not, or moves the pivot towards the nearest anchor. Zoom and flight end before the surface that they are told of, where
 //! [`LEAST_LEAVES`] of its leaves still fill the picture's height. Who zooms out sees the whole model come to the picture's middle.
 
@@ -109,6 +110,9 @@ pub struct Navigation {
     anchors: Vec<Anchor>,
     /// The points picked last, oldest first.
     picked: Vec<Anchor>,
+    /// What an explicit pose looks at, where that is within the bounds: it counts as well.
+    aim: Option<Anchor>,
+    home_aim: Option<Anchor>,
     fov_y_rad: f64,
     /// Distance from which the whole model fills the picture.
     fit: f64,
@@ -136,7 +140,18 @@ impl Navigation {
         let fit = (camera.eye - bounds.center()).length().max(f64::MIN_POSITIVE);
         let [azimuth, elevation] = orbit_deg.map(f64::to_radians);
         let home = Pose { pivot: bounds.center(), azimuth, elevation, distance: fit };
-        Self { bounds, up_axis, anchors: Vec::new(), picked: Vec::new(), fov_y_rad, fit, pose: home, home }
+        Self {
+            bounds,
+            up_axis,
+            anchors: Vec::new(),
+            picked: Vec::new(),
+            aim: None,
+            home_aim: None,
+            fov_y_rad,
+            fit,
+            pose: home,
+            home,
+        }
     }
 
     /// Balls all around the model; without any, its middle and what was picked are all that is kept in view.
@@ -152,13 +167,11 @@ impl Navigation {
         !self.anchors.is_empty()
     }
 
-    /// The view that [`Input::Home`] leads to, and to which this moves: from `eye` towards `target`, as far as that shows the model.
+    /// The view that [`Input::Home`] leads to, and to which this moves: from `eye` towards `target`. Exactly so where the target is within the
+    /// bounds; else as far as that shows the model.
     pub fn set_home(&mut self, eye: DVec3, target: DVec3, size: ImageSize) {
-        if let Some(pose) = self.pose_of(eye, target) {
-            self.pose = pose;
-            self.keep(size);
-            self.home = self.pose;
-        }
+        self.go_to(eye, target, size);
+        (self.home, self.home_aim) = (self.pose, self.aim);
     }
 
     /// Looks at a part of what there is, from the side that it was seen from.
@@ -179,14 +192,15 @@ impl Navigation {
     /// Goes on with bounds that hardly differ, as of a model in place of its preview; home is around them.
     pub fn set_bounds(&mut self, bounds: Aabb, size: ImageSize) {
         let anew = Self::new(bounds, self.up_axis, self.fov_y_rad, size);
-        (self.bounds, self.fit, self.home) = (anew.bounds, anew.fit, anew.home);
+        (self.bounds, self.fit, self.home, self.home_aim) = (anew.bounds, anew.fit, anew.home, None);
         self.keep(size);
     }
 
-    /// Moves to a pose, as of a camera path, as far as that shows the model.
+    /// Moves to a pose, as of a camera path. Exactly there where its target is within the bounds; else as far as that shows the model.
     pub fn go_to(&mut self, eye: DVec3, target: DVec3, size: ImageSize) {
         if let Some(pose) = self.pose_of(eye, target) {
             self.pose = pose;
+            self.aim = self.bounds.contains(target).then_some(Anchor { at: target, radius: 0.0 });
             self.keep(size);
         }
     }
@@ -275,6 +289,7 @@ impl Navigation {
                 }
             }
             Input::Home => {
+                self.aim = self.home_aim;
                 self.take(self.home);
                 self.keep(size);
             }
@@ -422,7 +437,7 @@ impl Navigation {
 
     fn all_anchors(&self) -> impl Iterator<Item = Anchor> {
         let middle = self.anchors.is_empty().then(|| Anchor { at: self.bounds.center(), radius: 0.0 });
-        self.anchors.iter().copied().chain(middle).chain(self.picked.iter().copied())
+        self.anchors.iter().copied().chain(middle).chain(self.picked.iter().copied()).chain(self.aim)
     }
 
     fn farthest(&self) -> f64 {

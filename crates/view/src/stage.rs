@@ -178,7 +178,7 @@ impl Stage {
             self.control = FrameRate::new(wish.target_ms, wish.finest_px).with_larger_pixels();
         }
         if before.is_none_or(|before| before.cpu_budget != wish.cpu_budget) {
-            self.scene.set_cpu_budget(wish.cpu_budget);
+            self.allow_bytes(wish.cpu_budget);
         }
         if before.is_none_or(|before| before.gpu_budget != wish.gpu_budget) {
             self.renderer.set_budget(wish.gpu_budget);
@@ -188,12 +188,20 @@ impl Stage {
         (self.changed, self.stuck) = (true, false);
     }
 
+    /// As many as are wished for, but no fewer than it takes to show each model at all.
+    fn allow_bytes(&mut self, cpu_budget: u64) {
+        self.scene.set_cpu_budget(cpu_budget.max(self.scene.least_bytes()));
+    }
+
     fn obey(&mut self, order: Order) {
         match order {
             Order::Add(key, file, placements) => {
                 let file = self.scene.residency_mut().add(file);
                 let ids = placements.into_iter().map(|placement| self.scene.add(Instance { file, placement }));
                 self.instances.insert(key, ids.collect());
+                if let Some((_, wish)) = self.wish {
+                    self.allow_bytes(wish.cpu_budget);
+                }
                 self.fresh = Some(Instant::now());
             }
             Order::Remove(key) => {

@@ -36,6 +36,9 @@ const EDGE_BAND: [f64; 2] = [0.86, 1.08];
 /// A frame at rest has this much of the last one's threshold: half its area.
 const REST_STEP: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
+/// Or as fine as takes so many times the target, if that is finer: steps that nobody sees are left out.
+const REST_TARGETS: f64 = 2.0;
+
 /// Splats grow with the threshold's minus second power on a surface, as long as the data go on.
 const SPLATS_EXPONENT: f64 = 2.0;
 
@@ -98,6 +101,8 @@ pub struct FrameRate {
     /// How long the cut of the frame that is being made took, and how many pixels it covers, as far as is known.
     cut_ms: f64,
     area_px: Option<f64>,
+    /// Threshold, splats and the pixels that they cover of the last frame that showed something.
+    shown: Option<[f64; 3]>,
     resting: bool,
     /// The last frame showed all there is at the finest threshold.
     settled: bool,
@@ -128,6 +133,7 @@ impl FrameRate {
             edge_step: 0,
             cut_ms: 0.0,
             area_px: None,
+            shown: None,
             resting: false,
             settled: false,
         }
@@ -145,7 +151,7 @@ impl FrameRate {
         self.resting = !moved;
         (self.cut_ms, self.area_px) = (0.0, None);
         if self.resting {
-            self.asked_px = (self.asked_px * REST_STEP).max(self.finest_px);
+            self.asked_px = (self.asked_px * REST_STEP).min(self.soon_px()).max(self.finest_px);
             return Fineness::px(self.asked_px);
         }
         Fineness { threshold_px: self.moving_px, most_splats: self.most_splats }
@@ -178,7 +184,9 @@ impl FrameRate {
     /// Takes note of a frame: how long it took from beginning to end, what it drew, and whether finer pages are on their way.
     pub fn drew(&mut self, frame_ms: f64, report: &CutReport, loading: bool) {
         let splats = report.primitives() as f64;
-        let threshold_px = f64::from(report.threshold_px);
+        // Where even the coarsest is too much, or the eye is amid a model, a budget makes it infinite, from where nothing gets finer.
+        let was_px = if report.threshold_px.is_finite() { report.threshold_px } else { self.coarsest_px() };
+        let threshold_px = f64::from(was_px);
         let usual_px = threshold_px / THRESHOLD_TO_DIAMETER;
         let area_px = self.area_px.unwrap_or(splats * usual_px * usual_px * std::f64::consts::FRAC_PI_4);
         let edge_step = if self.resting { 0 } else { self.edge_step };
@@ -191,10 +199,11 @@ impl FrameRate {
         self.cost.learn(&Work::new(splats, area_px, edge_px(edge_step)), frame_ms - self.cut_ms);
         let cut_splat_ms = self.cut_ms / splats.max(USUAL_SPLATS);
         self.cut_splat_ms += CUT_GAIN * (cut_splat_ms - self.cut_splat_ms);
+        self.shown = Some([threshold_px, splats, area_px]);
         if self.resting {
             return;
         }
-        (self.moving_px, self.asked_px) = (report.threshold_px, report.threshold_px);
+        (self.moving_px, self.asked_px) = (was_px, was_px);
         if !self.cost.is_known() {
             return;
         }
@@ -210,7 +219,20 @@ impl FrameRate {
         }
         // A step is at most an octave: beyond that the count says little.
         let step = (best.threshold_px / threshold_px.max(1e-6)).clamp(0.5, 2.0);
-        self.moving_px = (report.threshold_px * step as f32).clamp(self.finest_px, self.coarsest_px());
+        self.moving_px = (was_px * step as f32).clamp(self.finest_px, self.coarsest_px());
+    }
+
+    /// The threshold at which what the last frame showed is still drawn soon; infinite where nothing is known.
+    fn soon_px(&self) -> f32 {
+        let Some([threshold_px, splats, area_px]) = self.shown.filter(|_| self.cost.is_known()) else {
+            return f32::INFINITY;
+        };
+        let left_ms = REST_TARGETS * self.own_ms - self.cost.ms(&Work::new(0.0, area_px, 1.0));
+        let affordable = left_ms / (self.cost.splat_ms() + self.cut_splat_ms);
+        if affordable <= 0.0 {
+            return f32::INFINITY;
+        }
+        (threshold_px * (splats / affordable).powf(1.0 / SPLATS_EXPONENT)) as f32
     }
 
     fn coarsest_px(&self) -> f32 {

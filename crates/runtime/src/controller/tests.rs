@@ -75,6 +75,20 @@ fn it_holds_the_target_on_any_machine_and_through_a_sudden_turn() {
 }
 
 #[test]
+fn from_a_cut_without_a_threshold_it_finds_back() {
+    // A budget that not even the coarsest cut keeps to.
+    let mut control = FrameRate::new(100.0, 1.0);
+    let report = CutReport { drawn: 1, triangles: 300_000, threshold_px: f32::INFINITY, ..CutReport::default() };
+    for _ in 0..5 {
+        control.next(true);
+        control.drew(30.0, &report, false);
+        assert!(control.moving_px <= COARSEST_PX, "{control:?}");
+    }
+    let steps = (0..12).take_while(|_| control.next(false).threshold_px > 1.0).count();
+    assert!(steps < 10, "{control:?}");
+}
+
+#[test]
 fn what_turns_out_of_view_and_back_is_asked_for_as_it_was() {
     let mut machine = Machine { picture_ms: 5.0, splat_ms: 1e-4, ..Machine::default() };
     let mut control = FrameRate::new(100.0, 1.0);

@@ -53,6 +53,25 @@ fn it_begins_with_the_view_that_a_picture_has_by_default() {
 }
 
 #[test]
+fn a_pose_in_numbers_is_taken_as_it_is_and_home_leads_back_to_it() {
+    // Nearer than the balls are large: none of them is wholly in the picture.
+    let (eye, target) = (DVec3::new(0.02, 0.01, 1.05), DVec3::new(0.0, 0.02, 0.99));
+    let mut navigation = navigation(DVec3::ZERO, 1.0);
+    navigation.set_home(eye, target, SIZE);
+    let is_there =
+        |navigation: &Navigation| (navigation.eye() - eye).length() + (navigation.pivot() - target).length() < 1e-12;
+    assert!(is_there(&navigation), "{navigation:?}");
+    navigation.apply(&Input::Orbit { by_px: DVec2::new(3.0, 0.0) }, SIZE);
+    assert!((navigation.eye() - eye).length() < 0.01, "a small drag moves it a little");
+    navigation.go_to(eye * 4.0, DVec3::ZERO, SIZE);
+    navigation.apply(&Input::Home, SIZE);
+    assert!(is_there(&navigation), "{navigation:?}");
+    // One that looks at nothing shows the model all the same.
+    navigation.go_to(DVec3::X * 9.0, DVec3::X * 12.0, SIZE);
+    assert!(navigation.is_in_view(&navigation.pose, SIZE) && navigation.aim.is_none(), "{navigation:?}");
+}
+
+#[test]
 fn what_is_dragged_follows_the_hand() {
     let mut navigation = navigation(DVec3::ZERO, 1.0);
     // What is nearest to the eye goes to the right and down, as the hand.

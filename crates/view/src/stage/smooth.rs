@@ -6,7 +6,6 @@
 use super::{CAMERA, Stage};
 use crate::mailbox::{Figures, News, Wish};
 use gigalod_render::{Frame, RenderError};
-use std::time::Instant;
 
 impl Stage {
     pub(super) fn smooth(&mut self, number: u64, wish: &Wish) {
@@ -16,7 +15,6 @@ impl Stage {
             self.is_smooth = samples == 1;
             return;
         }
-        let begun = Instant::now();
         let draws =
             self.scene.draws(CAMERA).map(|(instance, selection)| (instance.placement, &selection.draw)).collect();
         let frame = Frame { camera: wish.camera, look: wish.look, draws };
@@ -39,7 +37,8 @@ impl Stage {
         self.frames += 1;
         let mut figures =
             Figures { wish: number, frames: self.frames, samples, finished: true, ..self.figures.clone() };
-        (figures.frame_ms, figures.gpu_bytes) = (begun.elapsed().as_secs_f64() * 1e3, self.renderer.gpu_bytes());
+        // What a frame takes is what the last one took that was not drawn again and again.
+        figures.gpu_bytes = self.renderer.gpu_bytes();
         self.mailbox.show(self.renderer.shown(), figures);
     }
 }

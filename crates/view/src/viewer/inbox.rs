@@ -15,7 +15,10 @@ impl Viewer {
         let delivery = self.mailbox.collect();
         for figures in delivery.figures {
             self.tally.drawn(&figures);
-            self.frame_times.push_back(figures.frame_ms as f32);
+            // Smoothing the last frame's edges is none.
+            if figures.samples == 1 {
+                self.frame_times.push_back(figures.frame_ms as f32);
+            }
             if self.frame_times.len() > 200 {
                 self.frame_times.pop_front();
             }
