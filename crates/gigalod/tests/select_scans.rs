@@ -37,6 +37,7 @@ fn compare(scene: &mut Scene, camera: &Camera, fineness: &Fineness) {
         file: FileId(0),
         view,
         threshold_px: report.threshold_px,
+        wanted_px: report.threshold_px,
         most_splats: u64::MAX,
         room_bytes: u64::MAX,
         interrupt: &interrupt,
@@ -79,7 +80,7 @@ fn scans_are_cut_as_by_the_slow_traversal() {
         ] {
             let camera = Camera::orbit(&bounds, up, orbit_deg, zoom, 0.7, size);
             for most_splats in [u64::MAX, 30_000, 500] {
-                compare(&mut scene, &camera, &Fineness { threshold_px, most_splats });
+                compare(&mut scene, &camera, &Fineness { most_splats, ..Fineness::px(threshold_px) });
             }
         }
     }

@@ -26,7 +26,7 @@ fn a_warm_frame_allocates_nothing() {
         (Fineness::px(0.0), u64::MAX, 1),
         (Fineness::px(0.0), u64::MAX, 2),
         (Fineness::px(1.0), u64::MAX, 2),
-        (Fineness { threshold_px: 0.5, most_splats: 20_000 }, u64::MAX, 2),
+        (Fineness { most_splats: 20_000, ..Fineness::px(0.5) }, u64::MAX, 2),
         // Too little for all pages and lists: what is missing is asked for in vain, frame after frame.
         (Fineness::px(0.5), 2 * MIB, 2),
     ];

@@ -11,12 +11,15 @@ pub struct Fineness {
     /// Most splats, triangles and points of all instances together. Where the threshold would need more, it is raised, in steps of at
     /// most 1/16, until it does not; only the root of each instance is always drawn.
     pub most_splats: u64,
+    /// What `threshold_px` would be if there were time for it. Above it, a node that the eye is amid of counts for where it is seen from
+    /// afar, not for being everywhere; else a few of them would take all there may be.
+    pub wanted_px: f32,
 }
 
 impl Fineness {
     /// This error, whatever it takes.
     pub fn px(threshold_px: f32) -> Self {
-        Self { threshold_px, most_splats: u64::MAX }
+        Self { threshold_px, most_splats: u64::MAX, wanted_px: threshold_px }
     }
 }
 

@@ -49,22 +49,46 @@ fn a_number_of_primitives_is_never_exceeded_and_its_threshold_is_the_first_that_
         let all = scene.select_converged(VIEW, &camera, &Fineness::px(0.1));
         for share in [3, 10, 70] {
             let most_splats = all.primitives() / share;
-            let fineness = Fineness { threshold_px: 0.1, most_splats };
+            let fineness = Fineness { most_splats, ..Fineness::px(0.1) };
             let report = scene.select(VIEW, &camera, &fineness);
             assert!(report.primitives() <= most_splats || report.threshold_px == f32::INFINITY, "{report:?}");
             assert!(report.threshold_px > 0.1 && report.limited_by == Some(Limit::Budget), "{report:?}");
             let shown = drawn(&scene, VIEW);
             // Nothing but the budget led there.
-            let same = scene.select(OTHER, &camera, &Fineness::px(report.threshold_px));
+            let at = |threshold_px: f32| Fineness { threshold_px, ..Fineness::px(0.1) };
+            let same = scene.select(OTHER, &camera, &at(report.threshold_px));
             assert_eq!((same.primitives(), same.max_error_px), (report.primitives(), report.max_error_px));
             assert_eq!(drawn(&scene, OTHER), shown);
             // A sixteenth of an octave finer would not fit.
-            let finer = scene.select(OTHER, &camera, &Fineness::px(report.threshold_px / 1.07));
+            let finer = scene.select(OTHER, &camera, &at(report.threshold_px / 1.07));
             assert!(report.threshold_px == f32::INFINITY || finer.primitives() > most_splats, "{report:?} {finer:?}");
             assert_eq!(scene.select(VIEW, &camera, &fineness), report, "nor earlier frames");
         }
         assert_eq!(scene.select(VIEW, &camera, &Fineness::px(0.1)), all);
         scene.serve();
+    }
+}
+
+/// Boxes of all levels hold the eye, and each might be everywhere on the screen.
+#[test]
+fn close_to_a_surface_a_budget_goes_to_what_is_near() {
+    let octree = Octree::sphere(7, false);
+    let mut scene = scene(&octree, 1 << 30, 1);
+    let (middle, radius) = (scene.bounds().center(), scene.bounds().extent().x * 0.5);
+    let eye = middle + DVec3::X * (radius * 1.004);
+    let size = ImageSize { width: 400, height: 300 };
+    let camera = Camera::look_at(eye, eye + DVec3::new(-0.3, 1.0, 0.1), DVec3::Z, 0.7, size);
+    let all = scene.select_converged(VIEW, &camera, &Fineness::px(0.1));
+    for share in [2, 8, 32] {
+        let fineness = Fineness { most_splats: all.primitives() / share, ..Fineness::px(0.1) };
+        let report = scene.select(VIEW, &camera, &fineness);
+        assert!(report.primitives() <= fineness.most_splats, "{report:?} {all:?}");
+        assert!(report.threshold_px.is_finite() && report.limited_by == Some(Limit::Budget), "{report:?}");
+        // Not the root alone.
+        assert!(report.primitives() * 4 > fineness.most_splats, "{report:?} of {fineness:?}");
+        // The same while the camera moves, with time that is short instead.
+        let paced = Fineness { threshold_px: report.threshold_px, ..fineness };
+        assert_eq!(scene.select(OTHER, &camera, &paced).primitives(), report.primitives());
     }
 }
 
@@ -137,7 +161,7 @@ fn hybrid_models_and_splats_share_a_scene_a_threshold_and_a_budget() {
     assert!(area > 5_000.0 && area.is_finite(), "{area}");
 
     let most_splats = all.primitives() / 4;
-    let report = scene.select(VIEW, &camera, &Fineness { threshold_px: 1.0, most_splats });
+    let report = scene.select(VIEW, &camera, &Fineness { most_splats, ..Fineness::px(1.0) });
     assert!(report.primitives() <= most_splats && report.limited_by == Some(Limit::Budget), "{report:?}");
     for (_, selection) in scene.draws(VIEW) {
         assert_eq!(selection.report.threshold_px, report.threshold_px, "one threshold for all");
@@ -159,7 +183,7 @@ fn what_is_broken_off_leaves_the_last_cut_and_its_requests() {
     scene.select_interruptible(VIEW, &first, &Fineness::px(0.2), &interrupt).unwrap();
     let shown = drawn(&scene, VIEW);
     interrupt.set();
-    for fineness in [Fineness::px(0.0), Fineness { threshold_px: 0.1, most_splats: 5000 }] {
+    for fineness in [Fineness::px(0.0), Fineness { most_splats: 5000, ..Fineness::px(0.1) }] {
         assert_eq!(scene.select_interruptible(VIEW, &second, &fineness, &interrupt), None);
         assert_eq!(drawn(&scene, VIEW), shown);
     }

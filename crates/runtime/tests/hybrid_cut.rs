@@ -263,6 +263,7 @@ fn what_is_interrupted_looks_at_few_more_nodes_and_keeps_no_pages() {
         file: FileId(0),
         view: ModelView::new(&camera(&scene, (0.0, 1.0)), &Similarity::IDENTITY),
         threshold_px: 0.0,
+        wanted_px: 0.0,
         most_splats: u64::MAX,
         room_bytes: u64::MAX,
         interrupt: &interrupt,
@@ -389,7 +390,7 @@ fn records_that_lie_end_in_a_picture_that_says_so() {
             for pose in POSES {
                 let camera = camera(&scene, pose);
                 for most_splats in [u64::MAX, 3000] {
-                    let report = scene.select_converged(VIEW, &camera, &Fineness { threshold_px: 0.25, most_splats });
+                    let report = scene.select_converged(VIEW, &camera, &Fineness { most_splats, ..Fineness::px(0.25) });
                     assert!(report.visited <= octree.root.nodes, "{name}");
                     drawn(&scene);
                 }

@@ -20,7 +20,7 @@ fn a_warm_hybrid_frame_allocates_nothing() {
     let looks = [
         (Fineness::px(0.0), u64::MAX),
         (Fineness::px(0.5), u64::MAX),
-        (Fineness { threshold_px: 0.1, most_splats: 20_000 }, u64::MAX),
+        (Fineness { most_splats: 20_000, ..Fineness::px(0.1) }, u64::MAX),
         // Too little for all pages and lists: what is missing is asked for in vain, frame after frame.
         (Fineness::px(0.1), 1 << 20),
     ];

@@ -125,7 +125,7 @@ proptest! {
         let pose = camera(&scene, pose);
         let free = scene.select_converged(VIEW, &pose, &Fineness::px(threshold_px));
         let most = |share: f64| ((free.drawn as f64 * share) as u64).max(1);
-        let fineness = Fineness { threshold_px, most_splats: most(share) };
+        let fineness = Fineness { most_splats: most(share), ..Fineness::px(threshold_px) };
         // What was looked at before must not matter; all that is wanted now is resident, and stays so.
         for (other, share) in before {
             let other = camera(&scene, other);
@@ -195,7 +195,7 @@ fn an_interrupted_cut_leaves_the_last_one() {
     scene.serve();
 
     interrupt.set();
-    for fineness in [Fineness::px(0.0), Fineness { threshold_px: 0.0, most_splats: 100 }] {
+    for fineness in [Fineness::px(0.0), Fineness { most_splats: 100, ..Fineness::px(0.0) }] {
         assert_eq!(scene.select_interruptible(VIEW, &back, &fineness, &interrupt), None);
         assert_same(&scene, VIEW, &report, &expected);
     }
@@ -234,7 +234,7 @@ fn instances_share_a_number_of_splats() {
     let camera = common::camera(&scene, 20.0, 1.0);
     let free = scene.select_converged(VIEW, &camera, &Fineness::px(0.5));
     for most_splats in [2, 4, 100, 1000, free.drawn / 2, free.drawn - 1, free.drawn] {
-        let report = scene.select(VIEW, &camera, &Fineness { threshold_px: 0.5, most_splats });
+        let report = scene.select(VIEW, &camera, &Fineness { most_splats, ..Fineness::px(0.5) });
         // One an instance is always drawn.
         assert!(report.drawn <= most_splats.max(4), "{} of {most_splats}", report.drawn);
         assert!(report.drawn > most_splats / 2);

@@ -154,7 +154,7 @@ impl FrameRate {
             self.asked_px = (self.asked_px * REST_STEP).min(self.soon_px()).max(self.finest_px);
             return Fineness::px(self.asked_px);
         }
-        Fineness { threshold_px: self.moving_px, most_splats: self.most_splats }
+        Fineness { threshold_px: self.moving_px, most_splats: self.most_splats, wanted_px: self.finest_px }
     }
 
     /// How many pixels of the screen a drawn pixel of this frame is to be wide, at least 1: for [`crate::Magnified::new`]. The cut has

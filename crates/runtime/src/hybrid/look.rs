@@ -144,6 +144,11 @@ impl<'a> Look<'a> {
         }
     }
 
+    /// True where a point lies before the eye, not behind it.
+    pub(super) fn is_before(&self, point: DVec3) -> bool {
+        self.forward.dot(point) > 0.0
+    }
+
     /// False where nothing that is no farther than this from what lies between some points is in the picture.
     pub(super) fn may_show(&self, points: &[DVec3], off: f64) -> bool {
         let is_outside = |inward: &DVec3| {

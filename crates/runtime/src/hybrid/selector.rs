@@ -38,7 +38,7 @@ pub struct HybridSelector {
 #[derive(Clone, Copy, Debug)]
 struct Counted {
     sight: Sight,
-    /// Smallest error of all that is above: with a threshold from there on, the node is not visited.
+    /// Smallest [`pressing_px`] of all that is above: with a raised threshold from there on, the node is not visited.
     least_px: f32,
 }
 
@@ -124,11 +124,14 @@ impl HybridSelector {
             if visited % CHECK_NODES == 0 && input.interrupt.is_set() {
                 return false;
             }
-            if least_px <= search.threshold_px() {
+            let is_raised = search.threshold_px() > input.wanted_px;
+            if is_raised && least_px <= search.threshold_px() {
                 continue;
             }
             let record = look.record(sight);
-            let family = match record.children > 0 && sight.error_px > search.threshold_px() {
+            let pressing_px = pressing_px(sight, record, &look, (table, frame));
+            let opens_px = if is_raised { pressing_px } else { sight.error_px };
+            let family = match record.children > 0 && opens_px > search.threshold_px() {
                 true => Family::of(sight.node, record, &look, skeleton, (table, frame)).ok(),
                 false => None,
             };
@@ -137,7 +140,7 @@ impl HybridSelector {
                 search.add_drawn(drawn(sight));
                 continue;
             };
-            let least_px = least_px.min(sight.error_px);
+            let least_px = least_px.min(pressing_px);
             let below: u64 = family.seen().iter().map(|child| drawn(*child)).sum();
             search.add(least_px, below as i64 - drawn(sight) as i64);
             self.counted.extend(family.seen().iter().map(|child| Counted { sight: *child, least_px }));
@@ -146,6 +149,15 @@ impl HybridSelector {
         search.raise_if_too_many();
         true
     }
+}
+
+/// How much there is to gain from what is below a node: its error on the screen, or about that where the eye is amid it.
+fn pressing_px(sight: Sight, record: &NodeRecord, look: &Look<'_>, (table, _): (&PageTable<Page>, u32)) -> f32 {
+    if !look.is_near(record) {
+        return sight.error_px;
+    }
+    let page = table.get(NodeId(sight.node));
+    page.map_or(sight.error_px, |page| sight.error_px.min(look.pressing_px(record, page)))
 }
 
 impl Walk<'_> {
@@ -187,9 +199,13 @@ impl Walk<'_> {
     /// Opens a node, draws it or leaves it out.
     fn visit(&mut self, sight: Sight, stack: &mut Vec<Sight>) -> Result<Result<(), Inconsistent>, Outcome> {
         let record = self.look.record(sight);
-        let is_coarse = sight.error_px > self.input.threshold_px;
+        let SelectInput { threshold_px, wanted_px, .. } = *self.input;
+        let is_coarse = sight.error_px > threshold_px;
         let mut limit = is_coarse.then_some(Limit::Data);
-        if is_coarse && record.children > 0 {
+        let waits = || pressing_px(sight, record, &self.look, self.table) <= threshold_px;
+        if is_coarse && record.children > 0 && threshold_px > wanted_px && waits() {
+            limit = Some(Limit::Budget);
+        } else if is_coarse && record.children > 0 {
             match Family::of(sight.node, record, &self.look, self.file.skeleton(), self.table) {
                 Ok(family) => {
                     self.report.visited += family.len();

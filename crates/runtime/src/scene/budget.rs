@@ -63,20 +63,21 @@ impl Scene {
         for instance in self.instances.keys() {
             self.lists.entry(Target { instance: *instance, view }).or_default();
         }
-        let asked_px = fineness.threshold_px;
         let most_splats = fineness.most_splats.min(self.most_splats_in_memory());
+        let asked = Fineness { most_splats, ..*fineness };
+        let asked_px = asked.threshold_px;
         let mut threshold_px = asked_px;
         // A cut in vain takes as long as another, so the search comes first where it will probably be.
-        let mut searched = self.is_probably_too_fine(view, camera, asked_px, most_splats, interrupt)?;
+        let mut searched = self.is_probably_too_fine(view, camera, &asked, interrupt)?;
         if searched {
-            threshold_px = self.threshold_within(view, camera, asked_px, most_splats, interrupt)?;
+            threshold_px = self.threshold_within(view, camera, &asked, interrupt)?;
         }
         let mut report = loop {
-            match self.cut_at(view, camera, threshold_px, most_splats, interrupt, beside) {
+            match self.cut_at(view, camera, &Fineness { threshold_px, ..asked }, interrupt, beside) {
                 Ok(report) => break report,
                 Err(Outcome::TooMany) if !searched => {
                     searched = true;
-                    threshold_px = self.threshold_within(view, camera, asked_px, most_splats, interrupt)?;
+                    threshold_px = self.threshold_within(view, camera, &asked, interrupt)?;
                 }
                 Err(Outcome::NoRoom) if self.make_room_for_lists() => {}
                 Err(Outcome::TooMany | Outcome::NoRoom) => threshold_px = coarser(threshold_px),
@@ -113,11 +114,11 @@ impl Scene {
         &mut self,
         view: ViewId,
         camera: &Camera,
-        threshold_px: f32,
-        most_splats: u64,
+        at: &Fineness,
         interrupt: &Interrupt,
         beside: bool,
     ) -> Result<CutReport, Outcome> {
+        let Fineness { threshold_px, most_splats, wanted_px } = *at;
         let mut report = CutReport { threshold_px, ..CutReport::default() };
         let coarsest = threshold_px == f32::INFINITY;
         let mut splats_left = if coarsest { u64::MAX } else { most_splats };
@@ -136,6 +137,7 @@ impl Scene {
                 file: *file,
                 view: ModelView::new(camera, placement),
                 threshold_px,
+                wanted_px,
                 most_splats: splats_left,
                 room_bytes,
                 interrupt,
@@ -156,15 +158,15 @@ impl Scene {
         Ok(report)
     }
 
-    /// True where a cut at `asked_px` is expected to have more than `most_splats`. `None` where it was broken off.
+    /// True where a cut as it is asked for is expected to have too much. `None` where it was broken off.
     fn is_probably_too_fine(
         &mut self,
         view: ViewId,
         camera: &Camera,
-        asked_px: f32,
-        most_splats: u64,
+        asked: &Fineness,
         interrupt: &Interrupt,
     ) -> Option<bool> {
+        let Fineness { threshold_px: asked_px, most_splats, .. } = *asked;
         if most_splats == u64::MAX {
             return Some(false);
         }
@@ -173,7 +175,7 @@ impl Scene {
             // What has just turned into view is told by a count that takes no time beside a cut.
             None => {
                 let threshold_px = first_searched_px(asked_px);
-                self.count_from(threshold_px, camera, most_splats, interrupt)?;
+                self.count_at(&Fineness { threshold_px, ..*asked }, camera, interrupt)?;
                 LastCut { threshold_px, primitives: self.search.drawn() }.expected_at(asked_px)
             }
         };
@@ -186,22 +188,22 @@ impl Scene {
         self.last.get(&view).copied().filter(tells)
     }
 
-    /// The threshold at which a camera sees no more than `most_splats`. `None` where the search was broken off.
+    /// The threshold at which a camera sees no more than is asked for. `None` where the search was broken off.
     ///
     /// A count from a threshold upwards takes as long as a cut there. So the first ones are made from coarse ones, or from where the
-    /// last cut points to, and tell about where to go on; the answer is that of a count from `asked_px`.
+    /// last cut points to, and tell about where to go on; the answer is that of a count from the threshold asked for.
     fn threshold_within(
         &mut self,
         view: ViewId,
         camera: &Camera,
-        asked_px: f32,
-        most_splats: u64,
+        asked: &Fineness,
         interrupt: &Interrupt,
     ) -> Option<f32> {
+        let Fineness { threshold_px: asked_px, most_splats, .. } = *asked;
         let last_px = self.telling_cut(view, most_splats).map(|last| last.expected_px(most_splats));
         let mut from_px = last_px.unwrap_or_else(|| first_searched_px(asked_px)).max(asked_px);
         for count in 1.. {
-            self.count_from(from_px, camera, most_splats, interrupt)?;
+            self.count_at(&Fineness { threshold_px: from_px, ..*asked }, camera, interrupt)?;
             match self.search.finer_px() {
                 Some(finer_px) if from_px > asked_px => {
                     from_px = if count < MOST_COUNTS { finer_px.max(asked_px) } else { asked_px };
@@ -212,14 +214,16 @@ impl Scene {
         Some(self.search.threshold_px())
     }
 
-    /// Counts what thresholds of `from_px` and above draw. `None` where it was broken off.
-    fn count_from(&mut self, from_px: f32, camera: &Camera, most_splats: u64, interrupt: &Interrupt) -> Option<()> {
-        self.search.begin(from_px, most_splats);
+    /// Counts what this threshold and those above it draw. `None` where it was broken off.
+    fn count_at(&mut self, at: &Fineness, camera: &Camera, interrupt: &Interrupt) -> Option<()> {
+        let Fineness { threshold_px, most_splats, wanted_px } = *at;
+        self.search.begin(threshold_px, most_splats);
         for Instance { file, placement } in self.instances.values() {
             let input = SelectInput {
                 file: *file,
                 view: ModelView::new(camera, placement),
-                threshold_px: from_px,
+                threshold_px,
+                wanted_px,
                 most_splats,
                 room_bytes: 0,
                 interrupt,

@@ -52,7 +52,7 @@ impl Stage {
     pub(super) fn cut_for(&mut self, wish: &Wish) -> bool {
         let interrupt = self.mailbox.interrupt().clone();
         let room = self.renderer.most_splats(wish.camera.size, &wish.look);
-        let fineness = Fineness { threshold_px: wish.finest_px, most_splats: self.most_splats.min(room) };
+        let fineness = Fineness { most_splats: self.most_splats.min(room), ..Fineness::px(wish.finest_px) };
         self.scene.set_tint(wish.tint);
         self.cut = None;
         loop {
