@@ -105,6 +105,11 @@ fn what_does_not_make_one_model_is_refused_by_name() {
     // All of the folder: broken files are not passed over.
     std::fs::remove_file(&cloud).unwrap();
     refused(&[folder], &cut);
+    // Nor is the only one in its folder named as that.
+    let one = tempfile::tempdir().unwrap();
+    let only = one.path().join("cut.obj");
+    std::fs::copy(&cut, &only).unwrap();
+    refused(&[one.path()], &only);
     // One that would be replaced.
     let ran = run!["build", folder, "-o", mesh, "--json"];
     assert_eq!(ran.failed(&mesh), "input and output are the same file");

@@ -325,7 +325,14 @@ impl Stage {
             }
             error => {
                 self.stuck = true;
-                self.mailbox.tell(News::Problem(error.to_string()));
+                let text = match error {
+                    RenderError::Budget { needed, .. } => format!(
+                        "this picture needs {} MiB on the graphics device: allow more (Budgets, Device memory), or make the window smaller",
+                        needed.div_ceil(1 << 20)
+                    ),
+                    error => error.to_string(),
+                };
+                self.mailbox.tell(News::Problem(text));
             }
         }
     }

@@ -59,9 +59,10 @@ impl Inputs {
                 return Err(CliError::in_file(file, "given twice"));
             }
         }
-        let name = match arguments {
-            [one] => one.clone(),
-            several => {
+        let name = match (arguments, &found[..]) {
+            (_, [only]) => only.clone(),
+            ([one], _) => one.clone(),
+            (several, _) => {
                 let first = several.first().map(|file| file.display().to_string()).unwrap_or_default();
                 PathBuf::from(format!("{first} and {} more", several.len() - 1))
             }

@@ -39,11 +39,14 @@ impl Viewer {
             self.names = Names::of(&model.source);
         }
         self.models.insert(place, Staged { key, model, asked, preview });
+        // What figures say is of what was there before.
+        self.figures.settled = false;
     }
 
     pub(crate) fn remove(&mut self, key: ModelKey) {
         self.models.retain(|staged| staged.key != key);
         self.mailbox.order(Order::Remove(key));
+        self.figures.settled = false;
         let _ = self.ask.send(Question::Remove(key));
         self.measuring = Measuring::default();
     }
