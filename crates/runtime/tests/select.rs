@@ -80,7 +80,7 @@ fn assert_true(scene: &Scene, camera: &Camera, asked_px: f32, report: &gigalod_r
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(96))]
+    #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
     fn random_trees_are_cut_as_by_the_slow_traversal(
