@@ -11,8 +11,8 @@ pub struct Fineness {
     /// Most splats, triangles and points of all instances together. Where the threshold would need more, it is raised, in steps of at
     /// most 1/16, until it does not; only the root of each instance is always drawn.
     pub most_splats: u64,
-    /// What `threshold_px` would be if there were time for it. Above it, a node that the eye is amid of counts for where it is seen from
-    /// afar, not for being everywhere; else a few of them would take all there may be.
+    /// What `threshold_px` would be if there were time and memory. Above it, a node of a hybrid model that the eye is amid of counts for
+    /// where some of its vertices are seen, not for being everywhere; else a few such nodes would take all there may be.
     pub wanted_px: f32,
 }
 

@@ -24,7 +24,7 @@ pub struct SelectInput<'a> {
     pub view: ModelView,
     /// Largest error on screen that is wanted, in pixels; 0 for everything there is.
     pub threshold_px: f32,
-    /// Up to this threshold, the error on screen decides; above it, what may be seen of it, too: see [`crate::Fineness::wanted_px`].
+    /// Up to this threshold, the error on screen decides; above it, where the node is seen, too: see [`crate::Fineness::wanted_px`].
     pub wanted_px: f32,
     /// With more splats, or triangles and points, than these the cut is broken off.
     pub most_splats: u64,

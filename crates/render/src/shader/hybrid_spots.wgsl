@@ -8,7 +8,7 @@
 
 // Vertices are rounded by up to this on the screen, in pixels.
 const ROUNDING_PX: f32 = 0.003;
-// Radius of a ball in its distance; one that is larger covers whatever is beyond it.
+// Largest radius of a ball, in its depth: of one that reaches the eye there is no outline.
 const MOST_BALL: f32 = 0.9;
 // How far behind its edge a line lies, in half widths.
 const BEHIND: f32 = 0.25;

@@ -19,8 +19,8 @@ impl Look<'_> {
         (center.abs() - half).max(DVec3::ZERO).length_squared() <= (2.0 * half).length_squared()
     }
 
-    /// How far off on the screen a node probably is of which this is the page: by every so manieth of the vertices before the eye; 0 where none
-    /// are. Sound it is not.
+    /// How far off on the screen a node probably is of which this is the page, by some of its vertices that lie before the eye; 0 where none
+    /// do. No bound: it tells what comes first.
     pub(super) fn pressing_px(&self, record: &NodeRecord, page: &Page) -> f32 {
         let grid = self.grid(record);
         let step = (page.positions.len() / SAMPLED).max(1);

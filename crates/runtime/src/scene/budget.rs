@@ -17,7 +17,7 @@ const LEAST_GROWTH_BYTES: u64 = 64 << 10;
 /// Thresholds are searched from so many times the one asked for or a pixel, where nothing is known.
 const FIRST_SEARCHED: f32 = 16.0;
 
-/// A cut of fewer primitives than this part of what there may be says nothing about one of as many: 1 over
+/// A cut that has less than one part of so many of what there may be tells nothing about a full one.
 const LITTLE: u64 = 4;
 
 /// So many times what there may be is expected, where a cut is not even tried.
