@@ -11,9 +11,12 @@
 //! not, or moves the pivot towards the nearest anchor. Zoom and flight end before the surface that they are told of, where
 //! [`LEAST_LEAVES`] of its leaves still fill the picture's height. Who zooms out sees the whole model come to the picture's middle.
 
+mod whole;
+
 use gigalod_geom::camera::{UpAxis, default_orbit_deg};
 use gigalod_geom::{Aabb, Camera, ImageSize};
 use glam::{DVec2, DVec3};
+use whole::Whole;
 
 /// Largest distance of the eye from the model's middle, in distances from which the whole model fills the picture.
 pub const FARTHEST: f64 = 12.0;
@@ -446,36 +449,6 @@ impl Navigation {
 
     fn least_distance(&self) -> f64 {
         self.bounds.diagonal().max(self.fit * 1e-3) * NEAREST
-    }
-}
-
-/// The model as a view of the whole shows it.
-#[derive(Clone, Copy, Debug)]
-struct Whole {
-    /// Of its bounds.
-    middle: DVec3,
-    /// Distance from which it fills the picture.
-    fit: f64,
-}
-
-impl Whole {
-    /// How far, as tangents along the picture's axes, the model's middle lies outside of where it would lie had a person zoomed in from a
-    /// view of the whole at some point of the picture: that is all the picture from close by, and its middle from where all of the
-    /// model is seen.
-    fn astray(&self, camera: &Camera) -> DVec2 {
-        let middle = camera.view_point(self.middle);
-        if middle.z <= 0.0 {
-            return DVec2::ZERO;
-        }
-        let free = camera.tan_half_fov() * (self.fit / middle.z - 1.0).max(0.0);
-        (DVec2::new(middle.x, middle.y).abs() / middle.z - free).max(DVec2::ZERO)
-    }
-
-    /// The way across the view after which the model is no more than so far astray.
-    fn way_back(&self, camera: &Camera, most: DVec2) -> DVec3 {
-        let middle = camera.view_point(self.middle);
-        let by = (self.astray(camera) - most).max(DVec2::ZERO) * middle.z;
-        camera.right * by.x.copysign(middle.x) + camera.up * by.y.copysign(middle.y)
     }
 }
 
