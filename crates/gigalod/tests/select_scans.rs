@@ -33,16 +33,7 @@ fn compare(scene: &mut Scene, camera: &Camera, fineness: &Fineness) {
     let report = scene.select(VIEW, camera, fineness);
     let view = ModelView::new(camera, &Similarity::IDENTITY);
     let interrupt = Interrupt::default();
-    let input = SelectInput {
-        file: FileId(0),
-        view,
-        threshold_px: report.threshold_px,
-        wanted_px: report.threshold_px,
-        most_splats: u64::MAX,
-        room_bytes: u64::MAX,
-        interrupt: &interrupt,
-        residency: scene.residency(),
-    };
+    let input = SelectInput::px(FileId(0), view, report.threshold_px, &interrupt, scene.residency());
     let mut drawn = Drawn::default();
     let mut expected = cut(&input, &Cutting::default(), &mut Work::default(), &mut drawn);
     if report.threshold_px > fineness.threshold_px && expected.max_error_px > fineness.threshold_px {

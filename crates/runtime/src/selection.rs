@@ -36,6 +36,20 @@ pub struct SelectInput<'a> {
     pub residency: &'a Residency,
 }
 
+impl<'a> SelectInput<'a> {
+    /// This error, whatever it takes.
+    pub fn px(
+        file: FileId,
+        view: ModelView,
+        threshold_px: f32,
+        interrupt: &'a Interrupt,
+        residency: &'a Residency,
+    ) -> Self {
+        let (most_splats, room_bytes) = (u64::MAX, u64::MAX);
+        Self { file, view, threshold_px, wanted_px: threshold_px, most_splats, room_bytes, interrupt, residency }
+    }
+}
+
 /// A list that a device-side selector made; only the renderer that runs the selector knows what it names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DeviceDraw {

@@ -39,18 +39,7 @@ impl CutSink for Record {
 fn record(scene: &Scene, azimuth: f64, zoom: f64, threshold_px: f32, cutting: Cutting) -> (CutReport, Record) {
     let view = ModelView::new(&camera(scene, azimuth, zoom), &Similarity::IDENTITY);
     let interrupt = Interrupt::default();
-    let residency = scene.residency();
-    let (file, most_splats, room_bytes) = (FileId(0), u64::MAX, u64::MAX);
-    let input = SelectInput {
-        file,
-        view,
-        threshold_px,
-        wanted_px: threshold_px,
-        most_splats,
-        room_bytes,
-        interrupt: &interrupt,
-        residency,
-    };
+    let input = SelectInput::px(FileId(0), view, threshold_px, &interrupt, scene.residency());
     let mut record = Record::default();
     let report = cut(&input, &cutting, &mut Work::default(), &mut record);
     (report, record)

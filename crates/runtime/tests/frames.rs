@@ -96,17 +96,7 @@ fn a_selector_on_the_device_is_served_like_one_on_the_host() {
     for _ in 0..40 {
         let view = ModelView::new(&camera, &Similarity::IDENTITY);
         let interrupt = &Interrupt::default();
-        let (threshold_px, most_splats, room_bytes) = (2.0, u64::MAX, u64::MAX);
-        let input = SelectInput {
-            file,
-            view,
-            threshold_px,
-            wanted_px: threshold_px,
-            most_splats,
-            room_bytes,
-            interrupt,
-            residency: &residency,
-        };
+        let input = SelectInput::px(file, view, 2.0, interrupt, &residency);
         selector.select(target, &input, &mut selection);
         assert_eq!(selection.draw, DrawSource::OnDevice(DeviceDraw { handle: 0 }));
         residency.serve(&selection.requests);

@@ -259,16 +259,8 @@ fn what_is_interrupted_looks_at_few_more_nodes_and_keeps_no_pages() {
     let octree = Octree::sphere(7, false);
     let scene = all_resident(&octree);
     let interrupt = Interrupt::default();
-    let input = SelectInput {
-        file: FileId(0),
-        view: ModelView::new(&camera(&scene, (0.0, 1.0)), &Similarity::IDENTITY),
-        threshold_px: 0.0,
-        wanted_px: 0.0,
-        most_splats: u64::MAX,
-        room_bytes: u64::MAX,
-        interrupt: &interrupt,
-        residency: scene.residency(),
-    };
+    let view = ModelView::new(&camera(&scene, (0.0, 1.0)), &Similarity::IDENTITY);
+    let input = SelectInput::px(FileId(0), view, 0.0, &interrupt, scene.residency());
     let target = Target { instance: InstanceId(7), view: VIEW };
     let (mut selector, mut selection) = (HybridSelector::default(), Selection::default());
     assert_eq!(selector.select(target, &input, &mut selection), Outcome::Complete);

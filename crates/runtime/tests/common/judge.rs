@@ -54,17 +54,7 @@ pub(crate) fn largest_px<'a>(list: impl Iterator<Item = &'a SplatBall>, view: &M
 /// Cuts the slow way.
 pub(crate) fn plain(residency: &Residency, view: ModelView, threshold_px: f32, cutting: Cutting) -> Plain {
     let interrupt = Interrupt::default();
-    let (file, most_splats, room_bytes) = (FileId(0), u64::MAX, u64::MAX);
-    let input = SelectInput {
-        file,
-        view,
-        threshold_px,
-        wanted_px: threshold_px,
-        most_splats,
-        room_bytes,
-        interrupt: &interrupt,
-        residency,
-    };
+    let input = SelectInput::px(FileId(0), view, threshold_px, &interrupt, residency);
     let mut plain = Plain { focal_px: view.focal_px, forward: view.forward, ..Plain::default() };
     plain.report = cut(&input, &cutting, &mut Work::default(), &mut plain);
     plain
