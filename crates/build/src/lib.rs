@@ -20,6 +20,7 @@ pub use error::BuildError;
 pub use input::{FileIdentity, InputIdentity, SideLog};
 pub use output::{Output, folder_of};
 pub use progress::{NoProgress, PhaseTime, Progress, Report};
+pub use site::GENERATOR;
 pub use unfinished::abandon;
 pub use work::{can_continue, work_folder};
 

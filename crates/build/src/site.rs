@@ -14,8 +14,10 @@ use gigalod_import::ModelStream;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// In files and in journals.
-pub(crate) const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"));
+/// Program, version and revision of the builder, in files and in journals; what was built by another is not gone on with.
+///
+/// The revision goes up with each change of what is built of the same input, as the test `bytes_are_pinned` finds it.
+pub const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"), " r2");
 
 /// All that is decided before the first byte is read.
 pub(crate) struct Site {

@@ -7,6 +7,8 @@
 //!
 //! Source: Duda, *Asymmetric numeral systems*, arXiv:1311.2540, 2013.
 
+use crate::FormatError;
+
 /// States stay at or above this between symbols; all begin here.
 pub(crate) const LOW: u32 = 1 << 16;
 
@@ -84,9 +86,44 @@ impl<const BITS: u32, const SYMBOLS: usize> Table<BITS, SYMBOLS> {
         self.ends[symbol]
     }
 
+    /// A model's tables, one after the other; `legal` says which symbols each of them may have.
+    pub(crate) fn put_all(tables: &[Self], legal: impl Fn(usize) -> u64) -> Vec<u8> {
+        let mut out = Vec::new();
+        for (number, table) in tables.iter().enumerate() {
+            table.put(legal(number), &mut out);
+        }
+        out
+    }
+
+    /// Undoes [`Self::put_all`]; `name` is what one of the `count` tables is called.
+    ///
+    /// # Errors
+    /// [`FormatError::Invalid`] where the bytes end early or late, a symbol occurs that cannot, or frequencies do not sum to
+    /// the whole.
+    pub(crate) fn take_all(
+        bytes: &[u8],
+        (count, name): (usize, &str),
+        legal: impl Fn(usize) -> u64,
+    ) -> Result<Vec<Self>, FormatError> {
+        let mut rest = bytes.iter().copied();
+        let mut byte = || {
+            rest.next()
+                .ok_or_else(|| FormatError::invalid("the model", format!("{} bytes, expected more", bytes.len())))
+        };
+        let table = |number| {
+            let wrong = |problem| FormatError::invalid("the model", format!("{name} {number} {problem}"));
+            Self::take(legal(number), &mut byte, wrong)
+        };
+        let tables = (0..count).map(table).collect::<Result<_, _>>()?;
+        match rest.count() {
+            0 => Ok(tables),
+            more => Err(FormatError::invalid("the model", format!("{more} bytes too many"))),
+        }
+    }
+
     /// As many bytes as the legal symbols need, with a bit for each symbol of a frequency above 1, then these frequencies but the last, as LEB128. No
     /// bit: all legal symbols alike.
-    pub(crate) fn put(&self, legal: u64, out: &mut Vec<u8>) {
+    fn put(&self, legal: u64, out: &mut Vec<u8>) {
         let frequencies = self.frequencies();
         let present = |symbol: &usize| frequencies[*symbol] > 1 && *self != Self::uniform(legal);
         let mask = (0..SYMBOLS).filter(present).fold(0u64, |mask, symbol| mask | 1 << symbol);
@@ -108,11 +145,7 @@ impl<const BITS: u32, const SYMBOLS: usize> Table<BITS, SYMBOLS> {
     ///
     /// # Errors
     /// What `byte` says where there is none, and what is wrong with the frequencies.
-    pub(crate) fn take<E>(
-        legal: u64,
-        mut byte: impl FnMut() -> Result<u8, E>,
-        wrong: impl Fn(String) -> E,
-    ) -> Result<Self, E> {
+    fn take<E>(legal: u64, mut byte: impl FnMut() -> Result<u8, E>, wrong: impl Fn(String) -> E) -> Result<Self, E> {
         let mut mask = 0;
         for at in 0..mask_bytes(legal) {
             mask |= u64::from(byte()?) << (8 * at);

@@ -30,6 +30,11 @@ fn verify_against_another_model_finds_violations() {
     let first = format!("warning: {}: built from another model than the one ", statue().glod.display());
     assert!(ran.stderr.starts_with(&first), "said before anything is measured: {ran:?}");
     assert_eq!(ran.stderr.matches("built from another model").count(), 1, "{ran:?}");
+    let points = tempfile::Builder::new().suffix(".xyz").tempfile().unwrap();
+    std::fs::write(&points, "0 0 0\n1 0 0\n0 1 0\n").unwrap();
+    let ran = run!["verify", statue().glod, "--against", points.path(), "--json"];
+    ran.failed(points.path());
+    assert!(ran.stderr.contains("a cloud of points, expected a mesh"), "{ran:?}");
     let missing = Path::new("missing.ply");
     run!["verify", statue().glod, "--against", missing, "--json"].failed(missing);
 }

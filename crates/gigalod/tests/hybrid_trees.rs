@@ -1,6 +1,6 @@
 //! Hybrid files as the builder makes them: the same bytes whatever threads and memory there are, and sound whatever the mesh is.
 
-use gigalod::build::{BuildError, NoProgress, Options, hybrid};
+use gigalod::build::{BuildError, GENERATOR, NoProgress, Options, hybrid, splats};
 use gigalod::format::hybrid::{HybridFile, NodeId};
 use gigalod::format::{Container, FileStore};
 use gigalod_synth::{Order, StatueOptions, write_statue};
@@ -63,6 +63,24 @@ fn neither_threads_nor_memory_change_what_is_built_of_a_statue() {
     let options = StatueOptions { triangles: 150_000, seed: 9, colors: true, order: Order::Coherent };
     write_statue(options, &mut ply, &mut |_, _| {}).unwrap();
     expect_the_same_bytes(&ply, &Options::default());
+}
+
+/// Where this fails on purpose, the revision in `gigalod_build::GENERATOR` has to go up with it: what was built before, in a cache
+/// or by half, does not hold any more.
+#[test]
+#[cfg_attr(not(target_arch = "x86_64"), ignore = "tried on no other machine")]
+fn bytes_are_pinned() {
+    let mut ply = Vec::new();
+    let options = StatueOptions { triangles: 20_000, seed: 4, colors: true, order: Order::Coherent };
+    write_statue(options, &mut ply, &mut |_, _| {}).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("a.glod");
+    let stream = gigalod::import::open(Box::new(Cursor::new(ply.clone()))).unwrap();
+    splats::build(stream, &Options::default(), &NoProgress, &out).unwrap();
+    let found = [built(&ply, &Options::default()).unwrap(), std::fs::read(out).unwrap()]
+        .map(|bytes| blake3::hash(&bytes).to_hex()[..16].to_string());
+    let pinned = ["", ""];
+    assert_eq!((GENERATOR, &found[..]), ("gigalod 0.1.0 r2", &pinned.map(String::from)[..]));
 }
 
 #[test]

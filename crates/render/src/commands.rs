@@ -34,7 +34,7 @@ impl<'a> Commands<'a> {
     pub(crate) fn goes_on(&mut self) -> Result<bool, RenderError> {
         let Some(interrupt) = self.interrupt else { return Ok(true) };
         let encoder = std::mem::replace(&mut self.encoder, self.gpu.device.create_command_encoder(&Default::default()));
-        let submitted = self.gpu.queue.submit([encoder.finish()]);
+        let submitted = self.gpu.submit([encoder.finish()]);
         // One slice is encoded while the one before is drawn.
         if let Some(before) = self.submitted.replace(submitted) {
             self.gpu.wait_for(before)?;
@@ -47,7 +47,7 @@ impl<'a> Commands<'a> {
     /// # Errors
     /// As for [`Gpu::check`].
     pub(crate) fn submit(self) -> Result<(), RenderError> {
-        self.gpu.queue.submit([self.encoder.finish()]);
+        self.gpu.submit([self.encoder.finish()]);
         self.gpu.check()
     }
 }

@@ -6,7 +6,7 @@
 use crate::RenderError;
 use crate::gbuffer::create_texture_seen_as;
 use gigalod_geom::ImageSize;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, RwLock};
 
 /// How much of what a device can do may be used. The picture is the same, but for what [`GpuLevel::WebGl`] says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,6 +51,8 @@ pub struct Gpu {
     pub(crate) has_view_formats: bool,
     can_add: bool,
     faults: Arc<Mutex<Faults>>,
+    /// Held by whoever submits; by one alone who needs the queue to run empty.
+    submitting: Arc<RwLock<()>>,
 }
 
 /// What went wrong since somebody asked.
@@ -132,7 +134,30 @@ impl Gpu {
         let sum = adapter.get_texture_format_features(crate::smooth::SUM);
         let can_add = sum.allowed_usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
             && sum.flags.contains(wgpu::TextureFormatFeatureFlags::BLENDABLE);
-        Ok(Self { device, queue, info: adapter.get_info(), wanted, level, has_view_formats, can_add, faults })
+        Ok(Self {
+            device,
+            queue,
+            info: adapter.get_info(),
+            wanted,
+            level,
+            has_view_formats,
+            can_add,
+            faults,
+            submitting: Arc::default(),
+        })
+    }
+
+    /// Hands commands to the device. The only way to do so: see [`Gpu::configure`].
+    pub(crate) fn submit(&self, commands: impl IntoIterator<Item = wgpu::CommandBuffer>) -> wgpu::SubmissionIndex {
+        let _turn = self.submitting.read().expect("nobody panics while holding it");
+        self.queue.submit(commands)
+    }
+
+    /// Gives a surface its size. That waits for the queue to be empty, and fails where another thread submits meanwhile; so others
+    /// wait for it.
+    pub(crate) fn configure(&self, surface: &wgpu::Surface<'_>, config: &wgpu::SurfaceConfiguration) {
+        let _alone = self.submitting.write().expect("nobody panics while holding it");
+        surface.configure(&self.device, config);
     }
 
     /// Name of the adapter, and through which interface it is driven.

@@ -52,7 +52,7 @@ pub(crate) fn read_texture(
             },
             wgpu::Extent3d { width, height: rows, depth_or_array_layers: 1 },
         );
-        gpu.queue.submit([encoder.finish()]);
+        gpu.submit([encoder.finish()]);
         read_rows(gpu, buffer, |all| {
             let padded_rows = all.chunks_exact(padded_row as usize).take(rows as usize);
             padded_rows.for_each(|padded| out.extend_from_slice(&padded[..row as usize]));

@@ -174,7 +174,7 @@ impl Staging {
                 }
             }
         }
-        let submitted = gpu.queue.submit([encoder.finish()]);
+        let submitted = gpu.submit([encoder.finish()]);
         let (sender, receiver) = channel();
         slot.buffer.map_async(wgpu::MapMode::Write, .., move |result| {
             // Nobody listens where the renderer is gone.

@@ -144,7 +144,7 @@ impl WindowPainter {
         self.size = size;
         if size.width.min(size.height) > 0 {
             (self.surface.config.width, self.surface.config.height) = clamped(&self.gpu, size);
-            self.surface.surface.configure(&self.gpu.device, &self.surface.config);
+            self.gpu.configure(&self.surface.surface, &self.surface.config);
         }
     }
 
@@ -163,14 +163,14 @@ impl WindowPainter {
             Current::Timeout | Current::Validation => Ok(Acquired::Again),
             Current::Occluded => Ok(Acquired::Hidden),
             Current::Outdated => {
-                self.surface.surface.configure(&self.gpu.device, &self.surface.config);
+                self.gpu.configure(&self.surface.surface, &self.surface.config);
                 Ok(Acquired::Again)
             }
             Current::Lost => {
                 self.gpu.check()?;
                 let made = self.surface.instance.create_surface(Handles(self.window.clone()));
                 self.surface.surface = made.map_err(|error| RenderError::NoAdapter(error.to_string()))?;
-                self.surface.surface.configure(&self.gpu.device, &self.surface.config);
+                self.gpu.configure(&self.surface.surface, &self.surface.config);
                 Ok(Acquired::Again)
             }
         }
@@ -192,8 +192,9 @@ impl WindowPainter {
     ) -> PaintedImage {
         let WindowImage(target) = target;
         let Gpu { device, queue, .. } = &self.gpu;
+        let size = target.texture.size();
         let screen = ScreenDescriptor {
-            size_in_pixels: [self.surface.config.width, self.surface.config.height],
+            size_in_pixels: [size.width, size.height],
             pixels_per_point: ui.pixels_per_point,
         };
         let mut encoder = device.create_command_encoder(&Default::default());
@@ -234,7 +235,7 @@ impl WindowPainter {
     /// # Errors
     /// As for [`WindowPainter::acquire`].
     pub fn show(&mut self, image: PaintedImage) -> Result<(), RenderError> {
-        self.gpu.queue.submit(image.commands);
+        self.gpu.submit(image.commands);
         self.gpu.queue.present(image.target);
         self.gpu.check()
     }
@@ -351,7 +352,7 @@ async fn open(
         config.present_mode = wgpu::PresentMode::Fifo;
         // A window lives of short ways, not of many pictures.
         config.desired_maximum_frame_latency = 1;
-        surface.configure(&gpu.device, &config);
+        gpu.configure(&surface, &config);
         gpu.check()?;
         return Ok((gpu, Surface { instance, surface, config }));
     }

@@ -280,7 +280,9 @@ impl Navigation {
             }
             Input::Pivot(anchor) => {
                 if let Some(pose) = self.pose_of(self.eye(), anchor.at).filter(|_| anchor.is_finite()) {
-                    self.pick(anchor);
+                    // As much of it as is seen from here: the eye stays where it is.
+                    let seen = pose.distance / enough_distance(1.0, &self.camera(size));
+                    self.pick(Anchor { radius: anchor.radius.min(seen), ..anchor });
                     self.take(pose);
                     self.keep(size);
                 }
@@ -407,8 +409,7 @@ impl Navigation {
             })
             .unwrap_or(Anchor { at: self.bounds.center(), radius: 0.0 });
         // From so far away all of it is seen.
-        let tan = self.camera(size).tan_half_fov().min_element();
-        let enough = nearest.radius * (1.0 + tan * tan).sqrt() / tan * 1.001;
+        let enough = enough_distance(nearest.radius, &self.camera(size));
         let from = Pose { distance: self.pose.distance.max(enough), ..self.pose };
         // The whole way always is enough: then the anchor is in the middle of the picture.
         let (mut bad, mut good) = (0.0, 1.0);
@@ -450,6 +451,12 @@ impl Navigation {
     fn least_distance(&self) -> f64 {
         self.bounds.diagonal().max(self.fit * 1e-3) * NEAREST
     }
+}
+
+/// From so far away a ball in the middle of the picture is seen as a whole.
+fn enough_distance(radius: f64, camera: &Camera) -> f64 {
+    let tan = camera.tan_half_fov().min_element();
+    radius * (1.0 + tan * tan).sqrt() / tan * 1.001
 }
 
 /// Depth from which [`LEAST_LEAVES`] of a surface fill the picture's height; a ball around a picked point has a leaf's diameter for radius.

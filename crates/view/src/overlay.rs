@@ -44,12 +44,22 @@ impl Viewer {
         self.work(ui);
         self.choice(ui);
         self.notices(ui, now);
-        if self.recorder.is_recording() {
-            let recording = egui::Area::new(egui::Id::unique("recording")).anchor(Align2::LEFT_TOP, vec2(12.0, 10.0));
-            recording.interactable(false).show(ui.ctx(), |ui| {
-                ui.label(RichText::new("recording").color(Color32::from_rgb(255, 90, 80)).size(16.0));
-            });
-        }
+        self.modes(ui);
+    }
+
+    /// What keys have switched on, and what switches it off.
+    fn modes(&self, ui: &Ui) {
+        let modes = [
+            (self.recorder.is_recording(), "recording (R stops)", Color32::from_rgb(255, 90, 80)),
+            (self.flies, "dragging turns the head (F)", Color32::from_rgb(120, 190, 255)),
+            (self.measuring.is_on, "click two points (Esc ends)", Color32::from_rgb(255, 170, 60)),
+        ];
+        let area = egui::Area::new(egui::Id::unique("modes")).anchor(Align2::LEFT_TOP, vec2(12.0, 10.0));
+        area.interactable(false).show(ui.ctx(), |ui| {
+            for (_, text, color) in modes.into_iter().filter(|(is_on, ..)| *is_on) {
+                ui.label(RichText::new(text).color(color).size(16.0));
+            }
+        });
     }
 
     fn help(&mut self, ui: &Ui) {

@@ -91,6 +91,11 @@ fn meet(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     (u >= -BESIDE && v >= -BESIDE && u + v <= 1.0 + BESIDE && t > 0.0).then_some(t)
 }
 
+/// Edge of an equilateral triangle as large as this one: across a slim one, vertices are nearer to each other than along it.
+fn edge_of([a, b, c]: [DVec3; 3]) -> f64 {
+    ((b - a).cross(c - a).length() * 2.0 / 3f64.sqrt()).sqrt()
+}
+
 impl NodePages {
     fn page(&mut self, file: &HybridFile, node: NodeId) -> Result<&Page, FormatError> {
         if self.bytes > MOST_BYTES {
@@ -146,9 +151,7 @@ impl NodePages {
                         let corners = triangle.map(corner);
                         let Some(t) = meet(ray, corners) else { continue };
                         if nearest.is_none_or(|before| t < before.t) {
-                            let [a, b, c] = corners;
-                            let detail = a.distance(b).max(b.distance(c)).max(c.distance(a));
-                            nearest = Some(Hit { t, radius: f64::from(record.error_geo), detail });
+                            nearest = Some(Hit { t, radius: f64::from(record.error_geo), detail: edge_of(corners) });
                         }
                     }
                 }

@@ -47,7 +47,9 @@ impl egui::DroppedFile for Dropped {
 fn what_is_dropped_onto_the_window_is_shown_with_the_rest() {
     let mut person = Person::opens(&["statue.glod"]);
     person.harness.input_mut().dropped_files.push(Arc::new(Dropped("statue.glod".into())));
+    assert_eq!(person.viewer().names.scene, "statue.toml");
     person.waits_until(|viewer| viewer.models.len() == 2);
+    assert_eq!(person.viewer().names.scene, "scene.toml");
     let orders = person.viewer().mailbox.receive(Some(Duration::ZERO)).orders;
     assert!(matches!(&orders[..], [Order::Add(first, ..), Order::Add(second, ..)] if first != second));
 }
@@ -74,6 +76,38 @@ fn the_mouse_turns_moves_and_comes_nearer() {
     person.drags(MIDDLE, MIDDLE + vec2(40.0, 0.0), PointerButton::Primary, Modifiers::CTRL);
     assert_eq!(person.viewer().own_viewpoint(), home);
     assert!(person.viewer().settings.towards_light.is_some(), "with Ctrl it is the light that moves");
+}
+
+#[test]
+fn a_flick_within_one_frame_turns_and_what_comes_after_it_does_not() {
+    let mut person = Person::opens(&["statue.glod"]);
+    let home = person.viewer().own_viewpoint();
+    let event = |pos, pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    let (begin, end) = (MIDDLE, MIDDLE + vec2(100.0, 0.0));
+    let flick = [Event::PointerMoved(begin), event(begin, true), Event::PointerMoved(end), event(end, false)];
+    let away = Event::PointerMoved(MIDDLE - vec2(0.0, 150.0));
+    // All in one frame: the harness makes one for each that it is told of.
+    person.harness.input_mut().events.extend(flick.into_iter().chain([away]));
+    person.harness.run_steps(2);
+    let flicked = person.viewer().own_viewpoint();
+    // As slowly, so that it is seen in several frames.
+    person.presses(egui::Key::Home);
+    assert_eq!(person.viewer().own_viewpoint(), home);
+    person.drags(begin, end, PointerButton::Primary, Modifiers::NONE);
+    let dragged = person.viewer().own_viewpoint();
+    let apart = |a: DVec3, b: DVec3| (a - b).length() / (home.eye - home.target).length();
+    assert!(apart(flicked.eye, home.eye) > 0.1 && apart(flicked.eye, dragged.eye) < 0.05, "{flicked:?} {dragged:?}");
+    // A click that trembles is none.
+    person.presses(egui::Key::Home);
+    let near = begin + vec2(2.0, 1.0);
+    person.harness.input_mut().events.extend([event(begin, true), Event::PointerMoved(near), event(near, false)]);
+    person.harness.run_steps(2);
+    assert_eq!(person.viewer().own_viewpoint(), home);
 }
 
 #[test]
@@ -282,6 +316,7 @@ fn a_preview_is_shown_until_the_model_is_there_and_nobody_is_moved() {
     person.waits_until(|viewer| viewer.jobs.running().is_empty());
     assert!(person.viewer().models.iter().all(|staged| staged.preview.is_none()));
     assert_eq!(person.viewer().models.len(), 1);
+    assert_ne!(person.viewer().names.scene, "scene.toml", "a model is not a scene because of its preview");
     assert_eq!(person.viewer().own_viewpoint(), before);
     let orders = person.viewer().mailbox.receive(Some(Duration::ZERO)).orders;
     let [Order::Add(preview, ..), Order::Add(model, ..), Order::Remove(gone)] = &orders[..] else {

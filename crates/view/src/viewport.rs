@@ -29,8 +29,11 @@ const LONGEST_SEARCH: f64 = 0.3;
 const UNCERTAIN: Color32 = Color32::from_rgb(255, 170, 60);
 const EXACT: Color32 = Color32::from_rgb(110, 220, 120);
 
+/// Points that a button moves at least between going down and coming up in one frame, unless that is a click; as egui has it.
+const LEAST_FLICK: f32 = 6.0;
+
 /// Radians that the light turns for each point of a drag.
-const LIGHT_PER_POINT: f64 = 0.01;
+const LIGHT_PER_POINT: f64 = 0.005;
 
 impl Viewer {
     /// Keys that work wherever the mouse is, unless something is being typed.
@@ -133,16 +136,15 @@ impl Viewer {
         let now = ui.input(|input| input.time);
         let scale = f64::from(ui.ctx().pixels_per_point());
         let px = |at: Pos2| DVec2::new(f64::from(at.x), f64::from(at.y)) * scale;
-        let drag = response.drag_delta();
-        let by_px = DVec2::new(f64::from(drag.x), f64::from(drag.y)) * scale;
         let modifiers = ui.input(|input| input.modifiers);
-        if by_px != DVec2::ZERO {
-            let pans = response.dragged_by(PointerButton::Secondary)
-                || response.dragged_by(PointerButton::Middle)
-                || modifiers.shift;
-            if modifiers.ctrl && response.dragged_by(PointerButton::Primary) {
+        for button in [PointerButton::Primary, PointerButton::Secondary, PointerButton::Middle] {
+            let drag = dragged(ui, response, button);
+            let by_px = DVec2::new(f64::from(drag.x), f64::from(drag.y)) * scale;
+            if drag == egui::Vec2::ZERO {
+                continue;
+            } else if modifiers.ctrl && button == PointerButton::Primary {
                 self.drag_light(drag);
-            } else if pans {
+            } else if modifiers.shift || button != PointerButton::Primary {
                 self.steer(&Input::Pan { by_px }, now);
             } else if self.flies {
                 // The eye follows the hand, as a head that turns.
@@ -246,6 +248,47 @@ impl Viewer {
             painter.circle(at, 4.0, color, Stroke::new(1.0, Color32::BLACK));
         }
     }
+}
+
+/// How far a button has dragged the picture since the last frame, in points. Where frames are long it goes down and comes up within
+/// one, or comes up on the way: what lies between counts, and nothing after it.
+fn dragged(ui: &Ui, response: &egui::Response, button: PointerButton) -> egui::Vec2 {
+    let was_dragged = response.dragged_by(button) || response.drag_stopped_by(button);
+    let is_on_picture = |at: Pos2| {
+        response.rect.contains(at) && ui.ctx().layer_id_at(at).is_none_or(|layer| layer == response.layer_id)
+    };
+    let is_told = |event: &&Event| match event {
+        Event::PointerMoved(_) => true,
+        Event::PointerButton { button: of, .. } => *of == button,
+        _ => false,
+    };
+    let (events, before) = ui.input(|input| {
+        let before = input.pointer.latest_pos().map(|at| at - input.pointer.delta());
+        (input.events.iter().filter(is_told).cloned().collect::<Vec<_>>(), before)
+    });
+    // Unless it goes down in this frame, it has been down before.
+    let turn = events.iter().find_map(|event| match event {
+        Event::PointerButton { pressed, .. } => Some(*pressed),
+        _ => None,
+    });
+    let (mut sum, mut is_flick) = (egui::Vec2::ZERO, false);
+    let mut last = before.filter(|_| was_dragged && turn != Some(true));
+    for event in events {
+        match event {
+            Event::PointerMoved(at) => {
+                sum += last.map_or(egui::Vec2::ZERO, |last| at - last);
+                last = last.map(|_| at);
+            }
+            Event::PointerButton { pos, pressed: false, .. } => {
+                sum += last.map_or(egui::Vec2::ZERO, |last| pos - last);
+                is_flick |= last.is_some() && sum.length() > LEAST_FLICK;
+                last = None;
+            }
+            Event::PointerButton { pos, .. } => last = Some(pos).filter(|at| is_on_picture(*at)),
+            _ => {}
+        }
+    }
+    if was_dragged || is_flick { sum } else { egui::Vec2::ZERO }
 }
 
 /// Where a world-space point appears, in egui's points; `None` behind the eye.

@@ -45,6 +45,15 @@ pub enum ViewError {
     Forced,
 }
 
+impl ViewError {
+    /// As the system says it, without the place in a library's source where it was found.
+    fn no_window(error: &dyn std::fmt::Display) -> Self {
+        let text = error.to_string();
+        let behind_place = text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+        Self::Window(behind_place.map_or(text.clone(), |(_, why)| why.into()))
+    }
+}
+
 impl std::fmt::Display for ViewError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -67,7 +76,7 @@ struct Wake;
 /// # Errors
 /// There is no window, no device, or it was lost for good. All else that goes wrong is told in the window.
 pub fn run(options: Options, host: Arc<dyn Host>) -> Result<Report, ViewError> {
-    let window_error = |error: &dyn std::fmt::Display| ViewError::Window(error.to_string());
+    let window_error = |error: &dyn std::fmt::Display| ViewError::no_window(error);
     let events = EventLoop::<Wake>::with_user_event().build().map_err(|error| window_error(&error))?;
     let proxy = events.create_proxy();
     let mut app = App { options, host, proxy, running: None, error: None };
@@ -204,7 +213,7 @@ impl Running {
         let ImageSize { width, height } = options.size;
         let attributes =
             Window::default_attributes().with_title("Gigalod").with_inner_size(PhysicalSize::new(width, height));
-        let window = events.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
+        let window = events.create_window(attributes).map_err(|error| ViewError::no_window(&error))?;
         let window = Arc::new(window);
         let inner = window.inner_size();
         let size = ImageSize { width: inner.width, height: inner.height };

@@ -9,7 +9,7 @@ use super::error::CliError;
 use super::files;
 use super::inputs::{Inputs, Sense};
 use super::progress::Console;
-use gigalod_build::{Progress, SideLog};
+use gigalod_build::{GENERATOR, Progress, SideLog};
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -101,7 +101,7 @@ fn note_of(folder: &Path, file: &Path) -> Option<PathBuf> {
     let stamp = files::stamp(&files::open(file).ok()?).ok()?;
     let path = file.canonicalize().ok()?;
     let mut hasher = blake3::Hasher::new();
-    hasher.update(path.as_os_str().as_encoded_bytes()).update(format!("{stamp:?}").as_bytes());
+    hasher.update(path.as_os_str().as_encoded_bytes()).update(format!("{GENERATOR} {stamp:?}").as_bytes());
     Some(folder.join("seen").join(&hasher.finalize().to_hex()[..32]))
 }
 
@@ -153,13 +153,13 @@ fn folder() -> Result<PathBuf, CliError> {
     })
 }
 
-/// Depends on all bytes of the file, the options that count and the program's version; memory and threads do not change what is built.
+/// Depends on all bytes of the file, the options that count and the builder's revision; memory and threads do not change what is built.
 fn key(file: &Path, options: &BuildOptions, at: &mut dyn FnMut(u64, u64) -> bool) -> Result<String, CliError> {
     let wrong = |error| CliError::in_file(file, error);
     let mut source = files::open(file)?;
     let total = source.metadata().map_err(wrong)?.len();
     let mut hasher = blake3::Hasher::new();
-    hasher.update(concat!("gigalod ", env!("CARGO_PKG_VERSION"), "\n").as_bytes());
+    hasher.update(format!("{GENERATOR}\n").as_bytes());
     hasher.update(options.recipe().as_bytes());
     let mut buffer = vec![0; 1 << 20];
     let mut done = 0;

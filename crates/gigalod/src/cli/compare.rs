@@ -49,7 +49,7 @@ const MOST_PIXELS: u32 = 16384;
 
 /// Any PNG, as 8-bit sRGB; what is transparent is not seen through.
 fn read_png(path: &Path) -> Result<Picture, CliError> {
-    let wrong = |error: png::DecodingError| CliError::in_file(path, error);
+    let wrong = |error: png::DecodingError| CliError::in_file(path, format!("not a PNG that can be read: {error}"));
     let mut decoder = png::Decoder::new(BufReader::new(files::open(path)?));
     decoder.set_transformations(png::Transformations::normalize_to_color8());
     let mut reader = decoder.read_info().map_err(wrong)?;

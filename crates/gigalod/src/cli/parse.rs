@@ -7,7 +7,9 @@ use glam::DVec3;
 /// Bytes: `4096`, `512MiB`, `2GB`; binary and decimal units, whole or decimal numbers.
 pub(crate) fn size(text: &str) -> Result<u64, String> {
     let digits = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let wrong = || format!("'{text}', expected a size such as 512MiB");
     let (number, unit) = text.split_at(digits);
+    let number: f64 = number.parse().map_err(|_| wrong())?;
     let factor: f64 = match unit.trim().to_ascii_lowercase().as_str() {
         "" | "b" => 1.0,
         "kib" | "k" => 1024.0,
@@ -20,7 +22,6 @@ pub(crate) fn size(text: &str) -> Result<u64, String> {
         "tb" => 1e12,
         other => return Err(format!("unit '{other}', expected B, KiB, MiB, GiB, TiB, kB, MB, GB or TB")),
     };
-    let number: f64 = number.parse().map_err(|_| format!("'{text}', expected a size such as 512MiB"))?;
     Ok((number * factor) as u64)
 }
 
@@ -34,6 +35,7 @@ pub(crate) fn memory(text: &str) -> Result<u64, String> {
 pub(crate) fn count(text: &str) -> Result<u64, String> {
     let digits = text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '_'))).unwrap_or(text.len());
     let (number, unit) = text.split_at(digits);
+    let number: f64 = number.replace('_', "").parse().map_err(|_| format!("'{text}', expected a number such as 2M"))?;
     let factor = match unit.to_ascii_lowercase().as_str() {
         "" => 1.0,
         "k" => 1e3,
@@ -41,7 +43,6 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
         "g" => 1e9,
         other => return Err(format!("unit '{other}', expected k, M or G")),
     };
-    let number: f64 = number.replace('_', "").parse().map_err(|_| format!("'{text}', expected a number such as 2M"))?;
     match (number * factor).round() {
         count if count >= 1.0 => Ok(count as u64),
         _ => Err("expected at least 1".into()),

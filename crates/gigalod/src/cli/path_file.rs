@@ -5,6 +5,7 @@ use super::files;
 use gigalod_geom::{CameraPath, Pose};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use std::fmt::Display;
 use std::io::Read;
 use std::path::Path;
 
@@ -27,10 +28,14 @@ struct FrameFile {
 /// An hour at 60 poses a second is 30 MB; more is not a path.
 const MOST_BYTES: u64 = 256 << 20;
 
+fn no_path(path: &Path, error: &dyn Display) -> CliError {
+    CliError::in_file(path, format!("not a camera path as `synth path` or the viewer writes them: {error}"))
+}
+
 pub(crate) fn read(path: &Path) -> Result<CameraPath, CliError> {
     let mut text = String::new();
-    files::open(path)?.take(MOST_BYTES).read_to_string(&mut text).map_err(|error| CliError::in_file(path, error))?;
-    let file: PathFile = serde_json::from_str(&text).map_err(|error| CliError::in_file(path, error))?;
+    files::open(path)?.take(MOST_BYTES).read_to_string(&mut text).map_err(|error| no_path(path, &error))?;
+    let file: PathFile = serde_json::from_str(&text).map_err(|error| no_path(path, &error))?;
     let finite = |v: &[f64; 3]| v.iter().all(|x| x.is_finite());
     if file.frames.is_empty() {
         return Err(CliError::in_file(path, "no frames, expected at least one"));

@@ -81,6 +81,7 @@ fn splats(
         let originals = Inputs::find(&args.against, console)?;
         let root = splats.skeleton().root();
         let (model, materials) = read_model(&originals, root.up, work, console)?;
+        expect_same_kind(&model, metadata, args, originals.name())?;
         expect_same(&model, metadata, &root.bounds, &mut problems);
         // Before what takes long.
         tell(args, &problems.told, console);
@@ -156,6 +157,22 @@ fn measure(
     };
     judge(&figures, problems);
     Ok(figures)
+}
+
+/// Points cannot be held against triangles, nor triangles against points.
+pub(super) fn expect_same_kind(
+    model: &Batch,
+    metadata: &Metadata,
+    args: &VerifyArgs,
+    name: &Path,
+) -> Result<(), CliError> {
+    let what = |has_triangles| if has_triangles { "a mesh" } else { "a cloud of points" };
+    let (found, expected) = (!model.triangles.is_empty(), metadata.input.triangles > 0);
+    if found == expected {
+        return Ok(());
+    }
+    let text = format!("{}, expected {}, of which {} was built", what(found), what(expected), args.file.display());
+    Err(CliError::in_file(name, text))
 }
 
 /// The file says how much was read, and how large that was.

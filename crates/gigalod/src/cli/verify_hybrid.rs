@@ -4,7 +4,7 @@ use super::args::VerifyArgs;
 use super::error::{CliError, Outcome};
 use super::inputs::Inputs;
 use super::progress::{Console, Work};
-use super::verify::{expect_same, read_model, tell, unit_of, verdict};
+use super::verify::{expect_same, expect_same_kind, read_model, tell, unit_of, verdict};
 use gigalod::verify::hybrid::{Measured, Structure, against, check, steps};
 use gigalod::verify::{Problems, mesh_of};
 use gigalod_build::Progress;
@@ -68,6 +68,7 @@ pub(super) fn run(
     if !args.against.is_empty() && problems.count == 0 {
         let originals = Inputs::find(&args.against, console)?;
         let (model, _) = read_model(&originals, root.up, work, console)?;
+        expect_same_kind(&model, metadata, args, originals.name())?;
         expect_same(&model, metadata, &root.bounds, &mut problems);
         // Before what takes long.
         tell(args, &problems.told, console);

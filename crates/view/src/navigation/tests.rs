@@ -127,6 +127,17 @@ fn a_picked_pivot_is_in_the_middle_and_is_turned_around() {
     assert!(((navigation.eye() - at).length() - distance).abs() < 1e-9);
 }
 
+#[test]
+fn a_pivot_does_not_move_the_eye_however_near_it_is_to_large_leaves() {
+    let mut navigation = navigation(DVec3::ZERO, 1.0);
+    let at = DVec3::new(0.3, 0.2, (1.0_f64 - 0.13).sqrt());
+    navigation.go_to(at * 1.05, at * 0.9, SIZE);
+    let eye = navigation.eye();
+    navigation.apply(&Input::Pivot(Anchor { at, radius: 0.2 }), SIZE);
+    assert!((navigation.eye() - eye).length() < 1e-9, "{} {eye}", navigation.eye());
+    assert!((navigation.pivot() - at).length() < 1e-9);
+}
+
 /// A ball with leaves of this radius, as the picker tells of them.
 const LEAF: f64 = 0.005;
 

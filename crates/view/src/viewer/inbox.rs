@@ -89,8 +89,12 @@ impl Viewer {
                 } else {
                     self.show_whole();
                 }
+                self.tell_of_specks(now);
             }
-            Opened::Scene(scene) => self.show_scene(scene, job),
+            Opened::Scene(scene) => {
+                self.show_scene(scene, job);
+                self.tell_of_specks(now);
+            }
             Opened::Folder(folder) => self.folder = Some(folder),
             Opened::Path(path) => {
                 self.recorder.load(path);

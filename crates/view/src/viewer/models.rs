@@ -15,6 +15,9 @@ use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Aabb, Camera};
 use gigalod_runtime::Similarity;
 
+/// Of a picture of everything, what has no more of it than this is hardly found.
+const SPECK: f64 = 0.01;
+
 /// Around a model, wherever it stands; world space.
 fn bounds_of(model: &Model) -> Aabb {
     let corners = model.file.bounds().corners();
@@ -35,12 +38,23 @@ impl Viewer {
         self.mailbox.order(Order::Add(key, model.file.clone(), model.placements.clone()));
         let _ = self.ask.send(Question::Add(key, model.clone()));
         let place = self.models.partition_point(|staged| staged.asked <= asked);
-        if place == 0 {
-            self.names = Names::of(&model.source);
-        }
         self.models.insert(place, Staged { key, model, asked, preview });
+        self.call_files_after_models(place);
         // What figures say is of what was there before.
         self.figures.settled = false;
+    }
+
+    /// Files to write are called as the only model, or as a scene once there are more, unless a person has called them otherwise.
+    fn call_files_after_models(&mut self, added: usize) {
+        let Staged { key, model, asked, .. } = &self.models[added];
+        if self.models.len() == 1 {
+            self.names = Names::of(&model.source);
+            return;
+        }
+        let is_other = |staged: &&Staged| staged.key != *key && !(staged.preview.is_some() && staged.asked == *asked);
+        if self.models.iter().filter(is_other).any(|other| Names::of(&other.model.source) == self.names) {
+            self.names = Names::default();
+        }
     }
 
     pub(crate) fn remove(&mut self, key: ModelKey) {
@@ -81,6 +95,16 @@ impl Viewer {
             self.navigation.look_at(bounds_of(&staged.model), self.size);
             (self.under_cursor, self.zoom_to_come, self.ahead) = (None, None, None);
         }
+    }
+
+    /// Of models that lie far apart, a view of everything shows nothing but specks.
+    pub(super) fn tell_of_specks(&mut self, now: f64) {
+        let whole = self.bounds().diagonal();
+        let is_speck = |staged: &&Staged| bounds_of(&staged.model).diagonal() < whole * SPECK;
+        let Some(speck) = self.models.iter().find(is_speck) else { return };
+        let name = speck.model.source.file_name().unwrap_or_default().to_string_lossy();
+        let text = format!("{name} is a speck beside all there is: a click on its name in the panel looks at it");
+        self.notice(&text, now);
     }
 
     /// What a length of 1 is, where all models agree: a symbol such as `m`.

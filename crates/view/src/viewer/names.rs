@@ -1,8 +1,9 @@
-//! What files are called that the viewer writes: as the first model, and pictures by number.
+//! What files are called that the viewer writes: as the only model, or as a scene of several, and pictures by number.
 
 use std::path::{Path, PathBuf};
 
-/// Names of files to write, as a person may change them.
+/// Names of files to write, as a person may change them; of several models, as they are by default.
+#[derive(PartialEq)]
 pub(crate) struct Names {
     pub(crate) picture: String,
     pub(crate) path: String,

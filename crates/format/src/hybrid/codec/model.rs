@@ -123,13 +123,9 @@ impl Model {
         (0..SIZES).min_by_key(bits).unwrap_or(0)
     }
 
-    /// The tables in order: see `rans::Table::put`.
+    /// The tables in order: see `rans::Table::put_all`.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        for (table, probabilities) in self.tables.iter().enumerate() {
-            probabilities.put(legal(table), &mut out);
-        }
-        out
+        Table::put_all(&self.tables, legal)
     }
 
     /// Undoes [`Model::to_bytes`].
@@ -138,20 +134,7 @@ impl Model {
     /// [`FormatError::Invalid`] where the bytes end early or late, a symbol occurs that cannot, or frequencies do not sum to
     /// 2048.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
-        let mut rest = bytes.iter().copied();
-        let mut byte = || {
-            rest.next()
-                .ok_or_else(|| FormatError::invalid("the model", format!("{} bytes, expected more", bytes.len())))
-        };
-        let mut tables = Vec::with_capacity(TABLES);
-        for table in 0..TABLES {
-            let wrong = |problem| FormatError::invalid("the model", format!("table {table} {problem}"));
-            tables.push(Table::take(legal(table), &mut byte, wrong)?);
-        }
-        match rest.count() {
-            0 => Ok(Self::with(tables)),
-            more => Err(FormatError::invalid("the model", format!("{more} bytes too many"))),
-        }
+        Table::take_all(bytes, (TABLES, "table"), legal).map(Self::with)
     }
 }
 

@@ -149,13 +149,9 @@ impl Model {
         &self.tables
     }
 
-    /// The tables of all contexts, in order: see `rans::Table::put`.
+    /// The tables of all contexts, in order: see `rans::Table::put_all`.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        for (context, table) in self.tables.iter().enumerate() {
-            table.put(legal(context), &mut out);
-        }
-        out
+        Table::put_all(&self.tables, legal)
     }
 
     /// Undoes [`Model::to_bytes`].
@@ -164,19 +160,6 @@ impl Model {
     /// [`FormatError::Invalid`] where the bytes end early or late, a symbol occurs that cannot, or frequencies do not sum to
     /// 512.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
-        let mut rest = bytes.iter().copied();
-        let mut byte = || {
-            rest.next()
-                .ok_or_else(|| FormatError::invalid("the model", format!("{} bytes, expected more", bytes.len())))
-        };
-        let mut tables = Vec::with_capacity(STORED);
-        for context in 0..STORED {
-            let wrong = |problem| FormatError::invalid("the model", format!("context {context} {problem}"));
-            tables.push(Table::take(legal(context), &mut byte, wrong)?);
-        }
-        match rest.count() {
-            0 => Ok(Self::with(tables)),
-            more => Err(FormatError::invalid("the model", format!("{more} bytes too many"))),
-        }
+        Table::take_all(bytes, (STORED, "context"), legal).map(Self::with)
     }
 }
