@@ -193,10 +193,8 @@ impl WindowPainter {
         let WindowImage(target) = target;
         let Gpu { device, queue, .. } = &self.gpu;
         let size = target.texture.size();
-        let screen = ScreenDescriptor {
-            size_in_pixels: [size.width, size.height],
-            pixels_per_point: ui.pixels_per_point,
-        };
+        let screen =
+            ScreenDescriptor { size_in_pixels: [size.width, size.height], pixels_per_point: ui.pixels_per_point };
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut commands = self.ui.renderer.update_buffers(device, queue, &mut encoder, ui.primitives, &screen);
         let picture = shown.map(|shown| self.present.bind(&self.gpu, &shown.picture));

@@ -7,6 +7,7 @@ use super::progress::Console;
 use super::stage::{CAMERA, Stage, Wait, primitives};
 use super::subject::Subject;
 use gigalod_build::Progress;
+use gigalod_geom::camera::default_orbit_deg;
 use gigalod_geom::{Camera, CameraPath};
 use gigalod_render::{Look, Renderer};
 use gigalod_runtime::{CutReport, Fineness, FrameRate};
@@ -95,6 +96,7 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliErr
     stage.scene.set_tint(args.draw.tint());
     let finest_px = args.draw.threshold_px(subject.default_error_px()) as f32;
     let look = args.draw.look(&subject.description);
+    warm_up(&mut stage, &path, look, args, console)?;
     let (stage_mut, last) = (&mut stage, CutReport::default());
     let mut run = Run { stage: stage_mut, path, args, finest_px, console, look, frames: Vec::new(), last };
     let on_path = match args.target_ms {
@@ -107,6 +109,25 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliErr
     let text = describe(&frames[..on_path], &summary, args);
     let report = BenchReport { adapter: stage.renderer.gpu().adapter(), frames, summary, problems };
     Ok(Outcome::new(&report, text))
+}
+
+/// Compiles what draws, by frames that nobody counts: of a few large splats, and of small ones from far away. Of the models no more
+/// is loaded than their roots.
+fn warm_up(
+    stage: &mut Stage,
+    path: &CameraPath,
+    look: Look,
+    args: &BenchArgs,
+    console: &Console,
+) -> Result<(), CliError> {
+    let fov_y_rad = args.fov.unwrap_or(path.fov_deg).to_radians();
+    let (bounds, up) = (stage.bounds(), stage.up());
+    for (zoom, threshold_px) in [(1.0, f32::INFINITY), (0.05, 2.0)] {
+        let orbit_deg = default_orbit_deg(&bounds, up);
+        let camera = Camera::orbit(&bounds, up, orbit_deg, zoom, fov_y_rad, args.draw.size);
+        stage.draw_until(&camera, look, &Fineness::px(threshold_px), Wait::Converged, Renderer::draw, console)?;
+    }
+    Ok(())
 }
 
 impl Run<'_> {
@@ -131,22 +152,24 @@ impl Run<'_> {
         self.stage.control = Some(control);
         let begun = Instant::now();
         let mut before = None;
-        loop {
+        let mut moved = loop {
             let elapsed = begun.elapsed().as_secs_f64();
             let t = (first + elapsed).min(last);
             work.at(((t - first) * 1e3) as u64);
             let pose = self.path.at(t);
             let moved = before != Some((pose.eye, pose.target));
-            before = Some((pose.eye, pose.target));
             if first + elapsed >= last {
+                break moved;
+            }
+            before = Some((pose.eye, pose.target));
+            self.paced_frame(t, moved)?;
+        };
+        let on_path = self.frames.len();
+        loop {
+            self.paced_frame(first + begun.elapsed().as_secs_f64(), moved)?;
+            if self.control().is_settled() {
                 break;
             }
-            self.paced_frame(t, moved)?;
-        }
-        let on_path = self.frames.len();
-        let mut moved = true;
-        while !self.control().is_settled() {
-            self.paced_frame(first + begun.elapsed().as_secs_f64(), moved)?;
             moved = false;
         }
         Ok(on_path)

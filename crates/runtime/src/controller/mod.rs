@@ -29,6 +29,10 @@ const GOOD_ENOUGH: f64 = 1.25;
 /// The next cut may have this many times the splats that the target affords, before it is made coarser at once.
 const CUT_BOUND: f64 = 1.08;
 
+/// No cut has more than so many times the splats of the one before, or [`FIRST_SPLATS`]: what has just turned into view has to be searched for
+/// a threshold first, which takes longer than the cut.
+const CUT_GROWTH: f64 = 3.0;
+
 /// Pixels are drawn larger where a frame would take more than so many times the target, and smaller where it would take less than
 /// so many.
 const EDGE_BAND: [f64; 2] = [0.86, 1.08];
@@ -54,6 +58,10 @@ const FIRST_PX: f32 = 8.0;
 
 /// Splats to begin with.
 const FIRST_SPLATS: u64 = 100_000;
+
+/// Pixels of the first picture, two of the screen wide: where little is loaded its splats are large, and nothing is known of what that
+/// costs.
+const FIRST_EDGE_STEP: u32 = 8;
 
 /// Splats that any frame may have: where so few take too long, it is not for their number, and a heap of discs would be no faster.
 const LEAST_SPLATS: u64 = 10_000;
@@ -165,10 +173,14 @@ impl FrameRate {
         if self.resting {
             return 1.0;
         }
+        if !self.cost.is_known() {
+            self.edge_step = if self.shown.is_none() { FIRST_EDGE_STEP.min(self.most_edge_step) } else { 0 };
+            return edge_px(self.edge_step);
+        }
         let work = |step: u32| Work::new(report.primitives() as f64, area_px, edge_px(step));
         let time = |step: u32| (cut_ms + self.cost.ms(&work(step))) / self.own_ms;
         let now = time(self.edge_step);
-        if self.cost.is_known() && !(EDGE_BAND[0]..=EDGE_BAND[1]).contains(&now) {
+        if !(EDGE_BAND[0]..=EDGE_BAND[1]).contains(&now) {
             let in_time = (0..self.most_edge_step).find(|step| time(*step) <= 1.0);
             self.edge_step = in_time.unwrap_or(self.most_edge_step);
         }
@@ -213,7 +225,9 @@ impl FrameRate {
         let in_time = (frame_ms / self.own_ms - 1.0).abs() <= DEAD_BAND;
         // So coarse that nothing is gained by more of it.
         let coarsest_splats = splats * (threshold_px / f64::from(self.coarsest_px())).powf(SPLATS_EXPONENT);
-        self.most_splats = ((best.splats * CUT_BOUND).max(coarsest_splats) as u64).max(LEAST_SPLATS);
+        let affordable =
+            (best.splats * CUT_BOUND).max(coarsest_splats).min((splats * CUT_GROWTH).max(FIRST_SPLATS as f64));
+        self.most_splats = (affordable as u64).max(LEAST_SPLATS);
         if in_time && error_px <= best.error_px * GOOD_ENOUGH {
             return;
         }

@@ -174,6 +174,25 @@ fn where_pixels_take_the_time_they_are_drawn_larger_and_a_sudden_turn_is_not_lat
 }
 
 #[test]
+fn what_nothing_is_known_of_is_approached_step_by_step() {
+    let mut machine = Machine { picture_ms: 20.0, splat_ms: 1e-4, covered_ms: 1e-5, noise: 0.0, frames: 0 };
+    let mut control = FrameRate::new(100.0, 1.0).with_larger_pixels();
+    // The first picture, whose splats are as large as what is loaded, is drawn with larger pixels; the next one tells what they cost.
+    let edges = [(); 2].map(|()| machine.draw(&mut control, View { detail: 2e3, data_px: 30.0 }, true).edge_px);
+    assert_eq!(edges, [2.0, 1.0]);
+    // What turns into view after a few splats comes in cuts that are at most three times as large as the one before.
+    let cuts: Vec<u64> = (0..6)
+        .map(|_| {
+            let most = control.next(true).most_splats;
+            machine.draw(&mut control, view(5e7), true);
+            most
+        })
+        .collect();
+    assert!(cuts[0] <= FIRST_SPLATS && cuts.windows(2).all(|pair| pair[1] <= 3 * pair[0]), "{cuts:?}");
+    assert!(cuts[5] > 3 * FIRST_SPLATS, "{cuts:?}");
+}
+
+#[test]
 fn at_rest_pixels_are_those_of_the_screen() {
     let mut machine = Machine { picture_ms: 60.0, splat_ms: 4e-5, covered_ms: 1e-5, noise: 0.1, frames: 0 };
     let mut control = FrameRate::new(60.0, 1.0).with_larger_pixels();

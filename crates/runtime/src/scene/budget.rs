@@ -23,25 +23,52 @@ const LITTLE: u64 = 4;
 /// So many times what there may be is expected, where a cut is not even tried.
 const SURELY_TOO_MANY: f64 = 1.15;
 
+/// So many times what there may be is expected, where a cut is tried without a count.
+const SURELY_FITS: f64 = 1.0;
+
 /// After so many counts, the next one is from the threshold asked for.
 const MOST_COUNTS: u32 = 4;
 
 /// What a view's last cut came to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LastCut {
+    came_to: Guess,
+    /// What a coarse count said of it.
+    counted: Guess,
+}
+
+/// So many primitives at a threshold.
+#[derive(Clone, Copy, Debug)]
+struct Guess {
     threshold_px: f32,
     primitives: u64,
 }
 
-impl LastCut {
+impl Guess {
     /// Primitives at another threshold: on a surface, they grow with its minus second power.
-    fn expected_at(&self, threshold_px: f32) -> f64 {
+    fn at(&self, threshold_px: f32) -> f64 {
         self.primitives as f64 * (f64::from(self.threshold_px) / f64::from(threshold_px)).powi(2)
     }
 
+    /// Primitives at another threshold, if they go on to grow as they have grown from a coarser one.
+    fn as_grown_from(&self, coarser: &Self, threshold_px: f32) -> f64 {
+        let grown = (self.primitives.max(1) as f64 / coarser.primitives.max(1) as f64).ln();
+        let finer = |from_px: f32, to_px: f32| f64::from(from_px / to_px).ln();
+        let growth = grown / finer(coarser.threshold_px, self.threshold_px).max(1e-6);
+        self.primitives as f64 * (growth.max(0.0) * finer(self.threshold_px, threshold_px)).exp()
+    }
+
     /// A threshold that is probably a little too fine for so many primitives.
-    fn expected_px(&self, most_splats: u64) -> f32 {
+    fn px(&self, most_splats: u64) -> f32 {
         self.threshold_px * finer_by(self.primitives, most_splats)
+    }
+}
+
+impl LastCut {
+    /// What a cut of another view would come to at the same threshold, if a coarse count of it is as far off as the last one was.
+    fn of(&self, counted: &Guess) -> Guess {
+        let part = counted.at(self.came_to.threshold_px) / self.counted.at(self.came_to.threshold_px).max(1.0);
+        Guess { primitives: (self.came_to.primitives as f64 * part) as u64, ..self.came_to }
     }
 }
 
@@ -68,23 +95,30 @@ impl Scene {
         let asked_px = asked.threshold_px;
         let mut threshold_px = asked_px;
         // A cut in vain takes as long as another, so the search comes first where it will probably be.
-        let mut searched = self.is_probably_too_fine(view, camera, &asked, interrupt)?;
-        if searched {
-            threshold_px = self.threshold_within(view, camera, &asked, interrupt)?;
+        let counted = match most_splats {
+            u64::MAX => None,
+            _ => Some(self.coarse_count(&asked, camera, interrupt)?),
+        };
+        let expected = counted.map(|counted| self.expected(view, most_splats, counted));
+        let mut searched = false;
+        if expected.is_some_and(|cut| cut.at(asked_px) > most_splats as f64 * SURELY_TOO_MANY) {
+            (threshold_px, searched) = self.threshold_within(expected, camera, &asked, interrupt)?;
         }
         let mut report = loop {
             match self.cut_at(view, camera, &Fineness { threshold_px, ..asked }, interrupt, beside) {
                 Ok(report) => break report,
                 Err(Outcome::TooMany) if !searched => {
-                    searched = true;
-                    threshold_px = self.threshold_within(view, camera, &asked, interrupt)?;
+                    (threshold_px, searched) = self.threshold_within(None, camera, &asked, interrupt)?;
                 }
                 Err(Outcome::NoRoom) if self.make_room_for_lists() => {}
                 Err(Outcome::TooMany | Outcome::NoRoom) => threshold_px = coarser(threshold_px),
                 Err(_) => return None,
             }
         };
-        self.last.insert(view, LastCut { threshold_px, primitives: report.primitives() });
+        if let Some(counted) = counted {
+            let came_to = Guess { threshold_px, primitives: report.primitives() };
+            self.last.insert(view, LastCut { came_to, counted });
+        }
         let limit = |report: &mut CutReport| {
             if threshold_px > asked_px && report.max_error_px > asked_px {
                 report.limited_by = Some(Limit::Budget);
@@ -158,60 +192,47 @@ impl Scene {
         Ok(report)
     }
 
-    /// True where a cut as it is asked for is expected to have too much. `None` where it was broken off.
-    fn is_probably_too_fine(
-        &mut self,
-        view: ViewId,
-        camera: &Camera,
-        asked: &Fineness,
-        interrupt: &Interrupt,
-    ) -> Option<bool> {
-        let Fineness { threshold_px: asked_px, most_splats, .. } = *asked;
-        if most_splats == u64::MAX {
-            return Some(false);
-        }
-        let expected = match self.telling_cut(view, most_splats) {
-            Some(last) => last.expected_at(asked_px),
-            // What has just turned into view is told by a count that takes no time beside a cut.
-            None => {
-                let threshold_px = first_searched_px(asked_px);
-                self.count_at(&Fineness { threshold_px, ..*asked }, camera, interrupt)?;
-                LastCut { threshold_px, primitives: self.search.drawn() }.expected_at(asked_px)
-            }
-        };
-        Some(expected > most_splats as f64 * SURELY_TOO_MANY)
+    /// A count that takes no time beside a cut, and tells of what has just turned into view.
+    fn coarse_count(&mut self, asked: &Fineness, camera: &Camera, interrupt: &Interrupt) -> Option<Guess> {
+        let threshold_px = first_searched_px(asked.threshold_px);
+        self.count_at(&Fineness { threshold_px, ..*asked }, camera, interrupt)?;
+        Some(Guess { threshold_px, primitives: self.search.drawn() })
     }
 
-    /// The last cut, unless it was of so little that it tells nothing about the next one.
-    fn telling_cut(&self, view: ViewId, most_splats: u64) -> Option<LastCut> {
-        let tells = |last: &LastCut| last.threshold_px.is_finite() && last.primitives >= most_splats / LITTLE;
-        self.last.get(&view).copied().filter(tells)
+    /// What a cut is expected to come to: as the last one did, unless that was of so little that it tells nothing about this one.
+    fn expected(&self, view: ViewId, most_splats: u64, counted: Guess) -> Guess {
+        let tells =
+            |last: &&LastCut| last.came_to.threshold_px.is_finite() && last.came_to.primitives >= most_splats / LITTLE;
+        self.last.get(&view).filter(tells).map_or(counted, |last| last.of(&counted))
     }
 
     /// The threshold at which a camera sees no more than is asked for. `None` where the search was broken off.
     ///
-    /// A count from a threshold upwards takes as long as a cut there. So the first ones are made from coarse ones, or from where the
-    /// last cut points to, and tell about where to go on; the answer is that of a count from the threshold asked for.
+    /// A count from a threshold upwards takes as long as a cut there. So the first one is made from where the cut is expected to be, and
+    /// tells about where to go on; the answer is that of a count from the threshold asked for. False beside it where that was not
+    /// counted, since hardly more are to be expected there than were counted before.
     fn threshold_within(
         &mut self,
-        view: ViewId,
+        expected: Option<Guess>,
         camera: &Camera,
         asked: &Fineness,
         interrupt: &Interrupt,
-    ) -> Option<f32> {
+    ) -> Option<(f32, bool)> {
         let Fineness { threshold_px: asked_px, most_splats, .. } = *asked;
-        let last_px = self.telling_cut(view, most_splats).map(|last| last.expected_px(most_splats));
-        let mut from_px = last_px.unwrap_or_else(|| first_searched_px(asked_px)).max(asked_px);
+        let mut from_px = expected.map_or(asked_px, |cut| cut.px(most_splats)).max(asked_px);
+        let mut before: Option<Guess> = None;
         for count in 1.. {
             self.count_at(&Fineness { threshold_px: from_px, ..*asked }, camera, interrupt)?;
-            match self.search.finer_px() {
-                Some(finer_px) if from_px > asked_px => {
-                    from_px = if count < MOST_COUNTS { finer_px.max(asked_px) } else { asked_px };
-                }
-                _ => break,
+            let Some(finer_px) = self.search.finer_px().filter(|_| from_px > asked_px) else { break };
+            let now = Guess { threshold_px: from_px, primitives: self.search.drawn() };
+            // Where the data end, there are hardly more at any threshold.
+            if before.is_some_and(|before| now.as_grown_from(&before, asked_px) < most_splats as f64 * SURELY_FITS) {
+                return Some((asked_px, false));
             }
+            before = Some(now);
+            from_px = if count < MOST_COUNTS { finer_px.max(asked_px) } else { asked_px };
         }
-        Some(self.search.threshold_px())
+        Some((self.search.threshold_px(), true))
     }
 
     /// Counts what this threshold and those above it draw. `None` where it was broken off.
