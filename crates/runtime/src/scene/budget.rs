@@ -14,8 +14,8 @@ use gigalod_geom::Camera;
 /// Lists grow by at least so much at a time.
 const LEAST_GROWTH_BYTES: u64 = 64 << 10;
 
-/// Thresholds are searched from so many times the one asked for or a pixel, where nothing is known.
-const FIRST_SEARCHED: f32 = 16.0;
+/// A coarse count is made at so many times the threshold asked for, or a pixel.
+const COARSE: f32 = 16.0;
 
 /// A cut that has less than one part of so many of what there may be tells nothing about a full one.
 const LITTLE: u64 = 4;
@@ -70,11 +70,6 @@ impl LastCut {
         let part = counted.at(self.came_to.threshold_px) / self.counted.at(self.came_to.threshold_px).max(1.0);
         Guess { primitives: (self.came_to.primitives as f64 * part) as u64, ..self.came_to }
     }
-}
-
-/// Where a search begins that knows nothing.
-fn first_searched_px(asked_px: f32) -> f32 {
-    FIRST_SEARCHED * asked_px.max(1.0)
 }
 
 impl Scene {
@@ -194,7 +189,7 @@ impl Scene {
 
     /// A count that takes no time beside a cut, and tells of what has just turned into view.
     fn coarse_count(&mut self, asked: &Fineness, camera: &Camera, interrupt: &Interrupt) -> Option<Guess> {
-        let threshold_px = first_searched_px(asked.threshold_px);
+        let threshold_px = COARSE * asked.threshold_px.max(1.0);
         self.count_at(&Fineness { threshold_px, ..*asked }, camera, interrupt)?;
         Some(Guess { threshold_px, primitives: self.search.drawn() })
     }
