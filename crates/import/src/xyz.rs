@@ -70,9 +70,13 @@ pub(crate) fn recognises(start: &[u8]) -> bool {
     if is_point(first) {
         return true;
     }
-    let is_count = numbers_of(first).is_some_and(|numbers| numbers.len() == 1);
-    let second = lines.next();
-    (is_count || named_columns(first).is_some()) && second.is_none_or(|line| line.is_empty() || is_point(line))
+    let count = numbers_of(first).filter(|numbers| numbers.len() == 1).map(|numbers| numbers[0]);
+    let is_named = named_columns(first).is_some();
+    match lines.find(|line| !line.is_empty()) {
+        Some(second) => (count.is_some() || is_named) && is_point(second),
+        // Any file with a number in it would be a count of points that do not come.
+        None => count == Some(0.0) || is_named,
+    }
 }
 
 /// Opens a file that is [recognised](recognises).

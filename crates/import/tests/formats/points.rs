@@ -2,9 +2,21 @@
 
 use crate::make::{e57, las};
 use crate::sources::{Model, error, read, read_in_drops};
+use std::io::Cursor;
 
 /// A text, and the positions, colours and normals of its points.
 type Columns = (&'static str, &'static [[f64; 3]], &'static [[u8; 3]], &'static [[f32; 3]]);
+
+#[test]
+fn a_number_alone_is_no_cloud_unless_it_says_that_there_are_no_points() {
+    let recognised = |text: &'static str| gigalod_import::format_of(Box::new(Cursor::new(text.as_bytes()))).unwrap();
+    for text in ["17295\n", "17295", "\n42\n\n", "3\na line of words\n"] {
+        assert_eq!(recognised(text), None, "{text:?}");
+    }
+    for text in ["0\n", "1\n\n1 2 3\n", "1\n1 2 3", "//X Y Z\n"] {
+        assert_eq!(recognised(text), Some("XYZ or PTS"), "{text:?}");
+    }
+}
 
 #[test]
 fn columns_of_text_are_told_by_their_values() {
