@@ -57,7 +57,8 @@ impl Viewer {
         let area = egui::Area::new(egui::Id::unique("modes")).anchor(Align2::LEFT_TOP, vec2(12.0, 10.0));
         area.interactable(false).show(ui.ctx(), |ui| {
             for (_, text, color) in modes.into_iter().filter(|(is_on, ..)| *is_on) {
-                ui.label(RichText::new(text).color(color).size(16.0));
+                // In one line: a new area is as narrow as can be.
+                ui.add(egui::Label::new(RichText::new(text).color(color).size(16.0)).extend());
             }
         });
     }

@@ -280,6 +280,11 @@ fn what_is_chosen_in_the_panel_is_wished_for() {
     let orders = wished(&mut person).orders;
     assert!(matches!(&orders[..], [Order::Picture(name, of)] if name == Path::new("statue-1.png") && *of == levels));
     assert_eq!(person.viewer().names.picture, "statue-2.png");
+    person.presses(egui::Key::F);
+    let mode = person.harness.get_by_label_contains("turns the head").rect();
+    assert!(mode.width() > 100.0 && mode.height() < 30.0, "in one line: {mode:?}");
+    person.presses(egui::Key::F);
+    assert!(person.harness.query_by_label_contains("turns the head").is_none());
     person.presses(egui::Key::F1);
     assert!(person.harness.query_by_label("Mouse and keys").is_some());
     person.presses(egui::Key::F2);
