@@ -155,6 +155,7 @@ impl Gpu {
 
     /// Gives a surface its size. That waits for the queue to be empty, and fails where another thread submits meanwhile; so others
     /// wait for it.
+    #[cfg(feature = "window")]
     pub(crate) fn configure(&self, surface: &wgpu::Surface<'_>, config: &wgpu::SurfaceConfiguration) {
         let _alone = self.submitting.write().expect("nobody panics while holding it");
         surface.configure(&self.device, config);
