@@ -147,7 +147,7 @@ impl Gpu {
         })
     }
 
-    /// Hands commands to the device. The only way to do so: see [`Gpu::configure`].
+    /// Hands commands to the device. The only way to do so: a window's surface is configured while nobody does.
     pub(crate) fn submit(&self, commands: impl IntoIterator<Item = wgpu::CommandBuffer>) -> wgpu::SubmissionIndex {
         let _turn = self.submitting.read().expect("nobody panics while holding it");
         self.queue.submit(commands)
