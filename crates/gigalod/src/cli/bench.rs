@@ -122,8 +122,8 @@ fn warm_up(
 ) -> Result<(), CliError> {
     let fov_y_rad = args.fov.unwrap_or(path.fov_deg).to_radians();
     let (bounds, up) = (stage.bounds(), stage.up());
+    let orbit_deg = default_orbit_deg(&bounds, up);
     for (zoom, threshold_px) in [(1.0, f32::INFINITY), (0.05, 2.0)] {
-        let orbit_deg = default_orbit_deg(&bounds, up);
         let camera = Camera::orbit(&bounds, up, orbit_deg, zoom, fov_y_rad, args.draw.size);
         stage.draw_until(&camera, look, &Fineness::px(threshold_px), Wait::Converged, Renderer::draw, console)?;
     }
