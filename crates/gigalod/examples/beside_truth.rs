@@ -3,7 +3,8 @@
 //! `cargo run --release --example beside_truth -- MODEL.ply OUT.png [AZIMUTH ELEVATION ZOOM [ERROR_PX [splats|hybrid|geometry]]]`
 //!
 //! `geometry` is a hybrid without appearance. Left: as it is drawn. Middle: the ray tracer. Right: their difference, four times
-//! enlarged; holes red, steep places drawn a little to the side blue, fat green. Prints the judge's counts and the image metrics.
+//! enlarged; holes red, steep places drawn a little to the side blue, fat green. Prints the judge's counts and the image metrics as one
+//! JSON object, and where the first holes are on standard error.
 
 use anyhow::{Context, Result};
 use gigalod::build::{NoProgress, Options, hybrid, splats};
@@ -18,11 +19,12 @@ use gigalod::verify;
 use gigalod_reference::judge::{Drawn, Hole, judge};
 use gigalod_reference::raytrace::supersampled_coverage;
 use gigalod_reference::{Bvh, Mesh, Picture, Shading, Truth, metrics, shade};
+use serde_json::json;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-const SIZE: ImageSize = ImageSize { width: 800, height: 600 };
+const SIZE: ImageSize = ImageSize { width: 640, height: 480 };
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -71,17 +73,21 @@ fn main() -> Result<()> {
     let compared = metrics::compare(&expected, &splats, Some(&metrics::silhouette_mask(&truth)));
     // What is steep, and drawn a little to the side, is deeper by the letter; nothing is seen through it.
     let (steep, open): (Vec<&Hole>, Vec<&Hole>) = verdict.holes.iter().partition(|hole| hole.within_error);
-    println!(
-        "{model}: {report:?}\n{} holes, {} fat, {} of {} steep and to the side, {compared:?}",
-        open.len(),
-        verdict.fat.len(),
-        steep.len(),
-        verdict.judged.count()
-    );
-
     for Hole { pixel: [x, y], behind_px, .. } in open.iter().take(10) {
-        println!("hole at {x}, {y}: {behind_px:.2} px behind");
+        eprintln!("hole at {x}, {y}: {behind_px:.2} px behind");
     }
+    let figures = json!({
+        "primitives": report.triangles + report.points,
+        "max_error_px": report.max_error_px,
+        "holes": open.len(),
+        "fat": verdict.fat.len(),
+        "steep": steep.len(),
+        "judged": verdict.judged.count(),
+        "psnr_db": compared.psnr_db,
+        "ssim": compared.ssim,
+        "flip_mean": compared.flip_mean,
+    });
+    println!("{figures}");
     let mut difference: Vec<[u8; 3]> = std::iter::zip(&expected.pixels, &splats.pixels)
         .map(|(a, b)| std::array::from_fn(|channel| a[channel].abs_diff(b[channel]).saturating_mul(4)))
         .collect();

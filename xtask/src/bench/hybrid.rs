@@ -5,6 +5,7 @@ use crate::figures::{Row, at_least, at_most, plain};
 use crate::program::number;
 use anyhow::{Context, Result};
 use serde_json::Value;
+use std::path::Path;
 
 /// A model: its name, its file, and whether all of its nodes are measured.
 type Model = (&'static str, String, bool);
@@ -26,6 +27,9 @@ pub(super) fn rows(bench: &Bench, scope: Scope<'_>, rows: &mut Vec<Row>) -> Resu
     for model in &models {
         built(bench, model, rows)?;
     }
+    for (name, file, _) in models.iter().filter(|(_, file, _)| Path::new(file).is_absolute()) {
+        beside_truth(bench, name, file, rows)?;
+    }
     if scope.large {
         large(bench, rows)?;
     }
@@ -44,6 +48,7 @@ fn build(bench: &Bench, model: &str, out: &str, appearance: &str, threads: &str)
 
 fn built(bench: &Bench, (name, model, is_measured): &Model, rows: &mut Vec<Row>) -> Result<()> {
     // Bytes of normals are in both: a file without appearance keeps them for shading.
+    let mut levels = Vec::new();
     for (appearance, least, most_bytes) in [("on", 60.0, 4.5), ("off", 100.0, 2.5)] {
         let one = build(bench, model, "hybrid.glod", appearance, "1")?;
         let two = build(bench, model, "hybrid.glod", appearance, "2")?;
@@ -66,8 +71,27 @@ fn built(bench: &Bench, (name, model, is_measured): &Model, rows: &mut Vec<Row>)
             );
             rows.push(at_most(figure, number(measured, "violations"), 0.0, &ratios));
         }
+        levels.push(bench.0.gigalod(&["info", "hybrid.glod"])?);
+    }
+    if matches!(*name, "dragon" | "statue, 7 M") {
+        averages(name, &levels, rows);
     }
     Ok(())
+}
+
+/// Triangles and points of a node on each level, as the hybrid paper's table 2 has them: of a file, and of one without appearance.
+fn averages(name: &str, files: &[Value], rows: &mut Vec<Row>) {
+    let levels = |file: &Value| file["per_level"].as_array().cloned().unwrap_or_default();
+    let of = |level: &Value| {
+        let each = |what| number(level, what) / number(level, "nodes");
+        format!("{:.0} triangles and {:.0} points", each("triangles"), each("points"))
+    };
+    let deepest = files.iter().map(|file| levels(file).len()).max().unwrap_or_default();
+    for level in 0..deepest {
+        let of_files = files.iter().map(|file| levels(file).get(level).map_or("none".into(), of));
+        let measured = of_files.collect::<Vec<_>>().join("; without appearance ");
+        rows.push(plain(format!("a node of level {level}, {name}"), measured));
+    }
 }
 
 fn large(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
@@ -81,6 +105,7 @@ fn large(bench: &Bench, rows: &mut Vec<Row>) -> Result<()> {
     rows.push(at_least("build, statue, 100 M".into(), rate, 60.0, "k triangles a CPU-second"));
     let bytes = number(&run, "output_bytes") / triangles;
     rows.push(at_most("file, statue, 100 M".into(), bytes, 4.5, "bytes a triangle"));
+    averages("statue, 100 M", &[bench.0.gigalod(&["info", out])?], rows);
     Ok(())
 }
 
@@ -97,7 +122,22 @@ fn quality(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Resul
     Ok(())
 }
 
-/// Primitives and time, in one run.
+/// Real scans from four sides, near and far, beside what a ray tracer sees of the original.
+fn beside_truth(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<()> {
+    const CAMERAS: [[&str; 3]; 4] = [["0", "0", "1"], ["130", "35", "1.3"], ["250", "-40", "3"], ["45", "10", "8"]];
+    let (mut wrong, mut worst) = (0.0, 0.0f64);
+    for [azimuth, elevation, zoom] in CAMERAS {
+        let arguments = [model, "beside_truth.png", azimuth, elevation, zoom, "0.5", "hybrid"];
+        let figures = bench.example("gigalod", "beside_truth", &arguments)?;
+        wrong += number(&figures, "holes") + number(&figures, "fat");
+        worst = worst.max(number(&figures, "flip_mean"));
+    }
+    let figure = format!("four cameras, {name}, 0.5 px");
+    rows.push(at_most(format!("{figure}: holes and fat pixels"), wrong, 0.0, ""));
+    rows.push(at_most(format!("{figure}: largest mean FLIP to the ray-traced original"), worst, 0.02, ""));
+    Ok(())
+}
+
 /// Samples of a pixel where shimmer is judged: what the viewer shows at rest.
 const SAMPLES: &str = "17";
 
@@ -128,6 +168,7 @@ fn looks(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<
     Ok(())
 }
 
+/// Primitives and time, in one run.
 fn drawn(bench: &Bench, name: &str, model: &str, rows: &mut Vec<Row>) -> Result<()> {
     for (kind, out) in [("hybrid", "hybrid.glod"), ("splats", "splats.glod")] {
         bench.0.gigalod(&["build", model, "-o", out, "--as", kind])?;
