@@ -97,6 +97,7 @@ impl<'m> Bvh<'m> {
         };
         let mut best: Option<SurfaceHit> = None;
         self.visit(
+            f64::INFINITY,
             |node| slabs.entry(node),
             |triangle| {
                 if let Some(hit) = prepared.meet(self.mesh.corners(triangle))
@@ -117,29 +118,34 @@ impl<'m> Bvh<'m> {
 
     /// The point of the surface nearest to `point`; `None` only where there are no triangles.
     pub fn nearest_point(&self, point: DVec3) -> Option<NearestPoint> {
+        self.near_point(point, None, 0.0)
+    }
+
+    /// Any point of the surface that is nearer to `point` than `enough`, or else the nearest; `None` only where there are no
+    /// triangles. The same answer sooner where `first` is the index of a triangle nearby.
+    pub fn near_point(&self, point: DVec3, first: Option<u32>, enough: f64) -> Option<NearestPoint> {
         let in_box = self.unit_box.of_point(point);
         let mut best: Option<NearestPoint> = None;
         let mut best_squared = f64::INFINITY;
         // Powers of two, so that comparing in unit-box space rounds nothing.
         let scale_squared = self.unit_box.scale * self.unit_box.scale;
-        self.visit(
-            |node| Some(distance_squared_to_box(in_box, node)),
-            |triangle| {
-                let (barycentrics, squared) = nearest_on_triangle(point, self.mesh.corners(triangle));
-                if best.is_none_or(|best| (squared, triangle) < (best_squared, best.triangle)) {
-                    best_squared = squared;
-                    best = Some(NearestPoint { distance: squared.sqrt(), triangle, barycentrics });
-                }
-                best_squared * scale_squared
-            },
-        );
+        let enough_squared = enough * enough;
+        let mut look = |triangle: u32| {
+            let (barycentrics, squared) = nearest_on_triangle(point, self.mesh.corners(triangle));
+            if best.is_none_or(|best| (squared, triangle) < (best_squared, best.triangle)) {
+                best_squared = squared;
+                best = Some(NearestPoint { distance: squared.sqrt(), triangle, barycentrics });
+            }
+            if best_squared < enough_squared { f64::NEG_INFINITY } else { best_squared * scale_squared }
+        };
+        let bound = first.map_or(f64::INFINITY, &mut look);
+        self.visit(bound, |node| Some(distance_squared_to_box(in_box, node)), look);
         best
     }
 
     /// Branch and bound, nearest boxes first. `entry` is a lower bound of what a box can hold, `None` to skip it; `visit`
-    /// looks at one triangle and returns the bound that a box must not exceed from now on.
-    fn visit(&self, entry: impl Fn(&BoxF32) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
-        let mut bound = f64::INFINITY;
+    /// looks at one triangle and returns the bound that a box must not exceed from now on; `bound` is that to begin with.
+    fn visit(&self, mut bound: f64, entry: impl Fn(&BoxF32) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
         let mut open: Vec<(f64, u32)> = Vec::with_capacity(64);
         if let Some(root) = self.nodes.first() {
             open.extend(entry(root.aabb()).map(|at| (at, 0)));
@@ -285,10 +291,17 @@ mod tests {
             mesh in triangle_soup(), points in prop::collection::vec(coordinates(), 20)) {
             let bvh = Bvh::build(&mesh);
             let (center, size) = (mesh.bounds().center(), mesh.bounds().extent().max_element() * 0.5);
-            for point in points {
-                let nearest = bvh.nearest_point(center + point * size).unwrap();
-                let (squared, triangle) = nearest_by_brute_force(&mesh, center + point * size).unwrap();
+            let mut first = 0;
+            for point in points.iter().map(|point| center + *point * size) {
+                let nearest = bvh.nearest_point(point).unwrap();
+                let (squared, triangle) = nearest_by_brute_force(&mesh, point).unwrap();
                 prop_assert_eq!((nearest.distance, nearest.triangle), (squared.sqrt(), triangle));
+                // From whatever triangle, and with less to look for.
+                prop_assert_eq!(bvh.near_point(point, Some(first), 0.0), Some(nearest));
+                let near = bvh.near_point(point, Some(first), size).unwrap();
+                let alone = nearest_on_triangle(point, mesh.corners(near.triangle)).1.sqrt();
+                prop_assert!(near.distance == alone && (near.distance < size || near == nearest), "{:?}", near);
+                first = triangle;
             }
         }
     }

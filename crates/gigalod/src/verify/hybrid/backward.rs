@@ -71,7 +71,16 @@ fn add(
 ) {
     let record = tally.record(node);
     let is_leaf = record.children == 0;
-    let distance = |at: DVec3| original.nearest_point(at).map_or(f64::MAX, |nearest| nearest.distance);
+    // Places that follow each other lie side by side. What is nearer than another place of an inner node tells nothing; of leaves,
+    // means are told as well.
+    let mut last = None;
+    let mut distance = |at: DVec3| {
+        let enough = if is_leaf { 0.0 } else { tally.largest(node) };
+        original.near_point(at, last, enough).map_or(f64::MAX, |near| {
+            last = Some(near.triangle);
+            near.distance
+        })
+    };
     for corners in &page.triangles {
         steps.step();
         let corners = corners.map(|corner| at[corner as usize]);

@@ -91,11 +91,12 @@ impl Parts {
 }
 
 impl Owned {
-    fn nearest(&self, bvh: &Bvh<'_>, at: DVec3) -> Option<(f64, NodeId)> {
-        let nearest = bvh.nearest_point(at)?;
-        let after = self.nodes.partition_point(|(first, ..)| *first <= nearest.triangle);
+    fn near(&self, bvh: &Bvh<'_>, at: DVec3, last: &mut Option<u32>, enough: f64) -> Option<(f64, NodeId)> {
+        let found = bvh.near_point(at, *last, enough)?;
+        *last = Some(found.triangle);
+        let after = self.nodes.partition_point(|(first, ..)| *first <= found.triangle);
         let (_, node, reach) = self.nodes[after - 1];
-        Some(((nearest.distance - reach).max(0.0), node))
+        Some(((found.distance - reach).max(0.0), node))
     }
 }
 
@@ -106,11 +107,22 @@ pub(super) struct Near<'a> {
     points: Bvh<'a>,
 }
 
+/// What was near the last place: of the surface, and of points. Places that follow each other lie side by side.
+#[derive(Default)]
+pub(super) struct Last {
+    surface: Option<u32>,
+    points: Option<u32>,
+}
+
 impl Near<'_> {
-    /// Distance of the nearest triangle or point, and its node; `None` where there is nothing at all.
-    pub(super) fn nearest(&self, at: DVec3) -> Option<(f64, NodeId)> {
-        let on_surface = self.cut.surface.nearest(&self.surface, at);
-        let at_point = self.cut.points.nearest(&self.points, at);
+    /// Distance of a triangle or point that is nearer than `enough`, or else of the nearest, and its node; `None` where there is nothing
+    /// at all.
+    pub(super) fn near(&self, at: DVec3, last: &mut Last, enough: f64) -> Option<(f64, NodeId)> {
+        let on_surface = self.cut.surface.near(&self.surface, at, &mut last.surface, enough);
+        if on_surface.is_some_and(|(distance, _)| distance < enough) {
+            return on_surface;
+        }
+        let at_point = self.cut.points.near(&self.points, at, &mut last.points, enough);
         match (on_surface, at_point) {
             (Some(surface), Some(point)) if point.0 < surface.0 => Some(point),
             (surface, point) => surface.or(point),

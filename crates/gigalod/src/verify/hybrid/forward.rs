@@ -5,7 +5,7 @@
 
 use super::cells::Cells;
 use super::choice::Pass;
-use super::cut::Near;
+use super::cut::{Last, Near};
 use super::sample::{LEAST_PARTS, area, ball, grid, parts, point};
 use super::tally::{Found, Tally, Way};
 use crate::verify::measure::Steps;
@@ -26,11 +26,11 @@ pub(super) fn measure(
     steps: &Steps<'_>,
 ) -> Found {
     let chunk = |triangles: &[[u32; 3]]| {
-        let mut found = Found::default();
+        let (mut found, mut last) = (Found::default(), Last::default());
         for triangle in triangles {
             steps.step();
             let corners = triangle.map(|corner| original.positions()[corner as usize]);
-            add(&mut found, corners, (pass, near), cells, tally);
+            add((&mut found, &mut last), corners, (pass, near), cells, tally);
         }
         found
     };
@@ -41,17 +41,25 @@ pub(super) fn measure(
     })
 }
 
-fn add(found: &mut Found, corners: [DVec3; 3], (pass, near): (&Pass, &Near<'_>), cells: &Cells<'_>, tally: &Tally<'_>) {
+fn add(
+    (found, last): (&mut Found, &mut Last),
+    corners: [DVec3; 3],
+    (pass, near): (&Pass, &Near<'_>),
+    cells: &Cells<'_>,
+    tally: &Tally<'_>,
+) {
     let (middle, radius) = ball(corners);
     if pass.region.as_ref().is_some_and(|region| !region.holds(middle)) {
         return;
     }
     // Where nothing is drawn at all, whoever is first answers for it.
-    let (distance, nearest) = near.nearest(middle).unwrap_or_else(|| nothing(pass));
-    let node = cells.node(corners, pass.level).unwrap_or(nearest);
+    let known = cells.node(corners, pass.level);
+    let enough = known.map_or(0.0, |node| (tally.largest(node) - radius).max(0.0));
+    let (distance, nearest) = near.near(middle, last, enough).unwrap_or_else(|| nothing(pass));
+    let node = known.unwrap_or(nearest);
     // A triangle so large may have been cut: then whoever's cell a part lies in stands for it.
     if radius > cells.edge(node) / 2.0 {
-        return add_large(found, corners, node, (pass, near), cells, tally);
+        return add_large((found, last), corners, node, (pass, near), cells, tally);
     }
     let record = tally.record(node);
     let is_leaf = record.children == 0;
@@ -67,14 +75,16 @@ fn add(found: &mut Found, corners: [DVec3; 3], (pass, near): (&Pass, &Near<'_>),
     let weight = if is_leaf { area(corners) } else { 0.0 };
     for (weights, share) in grid(parts) {
         let at = point(corners, weights);
-        let (distance, _) = near.nearest(at).unwrap_or_else(|| nothing(pass));
+        // Of leaves, means are told as well.
+        let enough = if is_leaf { 0.0 } else { tally.largest(node) };
+        let (distance, _) = near.near(at, last, enough).unwrap_or_else(|| nothing(pass));
         found.add(tally, node, Way::Forward, at, distance, weight * share);
     }
 }
 
 /// Holds each part against the larger error of two nodes: that with the triangle's middle in its cell, and that with the part.
 fn add_large(
-    found: &mut Found,
+    (found, last): (&mut Found, &mut Last),
     corners: [DVec3; 3],
     whole: NodeId,
     (pass, near): (&Pass, &Near<'_>),
@@ -88,7 +98,7 @@ fn add_large(
     let weight = if is_leaf { area(corners) } else { 0.0 };
     for (weights, share) in grid(parts) {
         let at = point(corners, weights);
-        let (distance, nearest) = near.nearest(at).unwrap_or_else(|| nothing(pass));
+        let (distance, nearest) = near.near(at, last, 0.0).unwrap_or_else(|| nothing(pass));
         let part = cells.node_at(at, pass.level).unwrap_or(nearest);
         let larger = [part, whole].into_iter().filter(is_measured).max_by(|a, b| error(a).total_cmp(&error(b)));
         if let Some(node) = larger {
