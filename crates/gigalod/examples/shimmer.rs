@@ -1,11 +1,12 @@
 //! How much each kernel shimmers while a camera moves slowly, beside a picture filtered as it should be.
 //!
-//! `cargo run --release --example shimmer -- MODEL.ply [ERROR_PX [splats|hybrid|geometry [SAMPLES]]]`
+//! `cargo run --release --example shimmer -- MODEL.ply [ERROR_PX [splats|hybrid|faded|geometry [SAMPLES]]]`
 //!
 //! The camera moves by a tenth of a pixel a frame, to the right and forwards. Prints one JSON object: for each kernel its
 //! shimmer and its sharpness as multiples of those of a ray tracer with 16 rays a pixel, and the holes of its first frame (what
 //! is steep and a little to the side is none, as everywhere).
-//! A kernel with less shimmer than that at less sharpness only blurs. Hybrid models have one; `geometry` is without appearance.
+//! A kernel with less shimmer than that at less sharpness only blurs. Hybrid models have one; `geometry` is without appearance, `faded` with
+//! levels that fade into each other.
 //! SAMPLES: at how many places each pixel is looked at; 1 where it is not said.
 
 use anyhow::{Context, Result};
@@ -32,13 +33,14 @@ const STEP_PX: f64 = 0.1;
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [model, rest @ ..] = &arguments[..] else {
-        anyhow::bail!("usage: shimmer MODEL.ply [ERROR_PX [splats|hybrid|geometry [SAMPLES]]]");
+        anyhow::bail!("usage: shimmer MODEL.ply [ERROR_PX [splats|hybrid|faded|geometry [SAMPLES]]]");
     };
     let threshold_px: f32 = rest.first().map_or(Ok(1.0), |text| text.parse())?;
     let mesh = read(Path::new(model))?;
     let kind = rest.get(1).map_or("splats", String::as_str);
     let samples: u32 = rest.get(2).map_or(Ok(1), |text| text.parse())?;
     let mut scene = open(Path::new(model), kind)?;
+    scene.set_cross_fade(kind == "faded");
     let mut renderer = Renderer::new(Gpu::open()?)?;
 
     let cameras: Vec<Camera> = (0..FRAMES).map(|frame| dolly(&mesh, f64::from(frame))).collect();

@@ -18,10 +18,11 @@ const ROUNDING_PX: f64 = 1e-2;
 /// Of judged pixels that may be deeper than they should, by the letter: what is steep, and drawn a little to the side.
 const MOST_STEEP: f64 = 0.02;
 
-fn keeps_its_word(model: &str, count: u64) {
+fn keeps_its_word(model: &str, count: u64, cross_fade: bool) {
     let (Some(path), Some(mut renderer)) = (scan(model), renderer()) else { return };
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene(built_hybrid(&path, folder.path()));
+    scene.set_cross_fade(cross_fade);
     let mesh = mesh(&path);
     let bvh = Bvh::build(&mesh);
     let (mut tightest, mut finite) = (0.0f64, 0);
@@ -63,16 +64,21 @@ fn keeps_its_word(model: &str, count: u64) {
 
 #[test]
 fn the_bunny_keeps_its_word() {
-    keeps_its_word("bun_zipper.ply", 60);
+    keeps_its_word("bun_zipper.ply", 60, false);
 }
 
 #[test]
 fn laurana_keeps_her_word() {
-    keeps_its_word("laurana.ply", 36);
+    keeps_its_word("laurana.ply", 36, false);
+}
+
+#[test]
+fn laurana_keeps_her_word_while_her_levels_fade() {
+    keeps_its_word("laurana.ply", 36, true);
 }
 
 /// Not manifold.
 #[test]
 fn the_dragon_of_lower_resolution_keeps_its_word() {
-    keeps_its_word("dragon_vrip_res2.ply.gz", 36);
+    keeps_its_word("dragon_vrip_res2.ply.gz", 36, false);
 }

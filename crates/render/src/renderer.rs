@@ -217,7 +217,7 @@ impl Renderer {
             hybrid_bands: self.bands(camera.size, Kernel::Round),
             read_back,
         };
-        let first = self.aimed_at(&sent, smooth::middle_px(camera));
+        let first = self.aimed_at(&sent, smooth::middle_px(camera), 0);
         let pages = arena::needed_bytes(lists.hybrid.iter().map(|(_, list)| *list));
         let most_page_bytes = arena::most_bytes(&self.gpu);
         if pages > most_page_bytes {

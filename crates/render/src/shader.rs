@@ -2,8 +2,9 @@
 //! stands for one of several files: where a pass delivers what it draws.
 
 /// Sources that others import, by name.
-const SHARED: [(&str, &str); 21] = [
+const SHARED: [(&str, &str); 22] = [
     ("dot.wgsl", include_str!("shader/dot.wgsl")),
+    ("hybrid_fade.wgsl", include_str!("shader/hybrid_fade.wgsl")),
     ("hybrid_kinds.wgsl", include_str!("shader/hybrid_kinds.wgsl")),
     ("hybrid_params.wgsl", include_str!("shader/hybrid_params.wgsl")),
     ("hybrid_place.wgsl", include_str!("shader/hybrid_place.wgsl")),

@@ -44,7 +44,8 @@ fn drawn(scene: &Scene, view: ViewId) -> Vec<Vec<u32>> {
 fn a_number_of_primitives_is_never_exceeded_and_its_threshold_is_the_first_that_fits() {
     let octree = Octree::sphere(7, false);
     let mut scene = scene(&octree, 1 << 30, 2);
-    for (azimuth, zoom) in [(0.0, 1.0), (60.0, 3.0), (190.0, 0.2)] {
+    for (azimuth, zoom, cross_fade) in [(0.0, 1.0, false), (60.0, 3.0, true), (60.0, 3.0, false), (190.0, 0.2, true)] {
+        scene.set_cross_fade(cross_fade);
         let camera = camera(&scene, azimuth, zoom);
         let all = scene.select_converged(VIEW, &camera, &Fineness::px(0.1));
         for share in [3, 10, 70] {

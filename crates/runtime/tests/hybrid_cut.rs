@@ -6,7 +6,7 @@ use common::octree::{CELL_BITS, Octree, RADIUS, leaves_below, open};
 use gigalod_format::hybrid::{NodeId, NodeRecord, Root};
 use gigalod_geom::camera::UpAxis;
 use gigalod_geom::{Camera, ImageSize, projected};
-use gigalod_runtime::hybrid::CHECK_NODES;
+use gigalod_runtime::hybrid::{CHECK_NODES, CROSS_FADE, RANKS};
 use gigalod_runtime::residency::InlineLoader;
 use gigalod_runtime::splats::Cutting;
 use gigalod_runtime::{
@@ -206,6 +206,42 @@ fn assert_complete(octree: &Octree, camera: &Camera, nodes: &BTreeMap<NodeId, bo
         }
     }
     walk(octree, camera, NodeId(0), &reached);
+}
+
+#[test]
+fn of_each_rank_of_pixels_a_cross_fade_shows_a_whole_cut_within_the_threshold() {
+    let octree = Octree::sphere(7, false);
+    let mut scene = all_resident(&octree);
+    scene.set_cross_fade(true);
+    let mut fading = 0;
+    for pose in POSES {
+        let camera = camera(&scene, pose);
+        for threshold_px in [0.0, 0.5, 1.0, 4.0, 40.0, f32::INFINITY] {
+            let report = scene.select(VIEW, &camera, &Fineness::px(threshold_px));
+            scene.serve();
+            let (_, selection) = scene.draws(VIEW).next().expect("one instance");
+            let DrawSource::Hybrid(list) = &selection.draw else { panic!("{:?}", selection.draw) };
+            let shown =
+                |rank: u8| list.nodes.iter().filter(move |node| (node.ranks.from..node.ranks.end).contains(&rank));
+            for rank in 0..RANKS {
+                assert_complete(&octree, &camera, &shown(rank).map(|node| (node.node, node.draws_lines)).collect());
+            }
+            for node in &list.nodes {
+                let record = &octree.records[node.node.0 as usize];
+                let error_px = judge(&octree, &camera, node.node).error_px as f32;
+                assert!(record.children == 0 || error_px <= threshold_px && error_px <= report.max_error_px);
+                // The nearer to the threshold, the fewer; below, all that the parent has left.
+                let begins_px = threshold_px * (1.0 - CROSS_FADE);
+                if record.children > 0 && error_px > begins_px && threshold_px.is_finite() {
+                    let kept = f32::from(RANKS) * (threshold_px - error_px) / (threshold_px - begins_px);
+                    assert_eq!(node.ranks.end, RANKS);
+                    assert!((f32::from(node.ranks.end - node.ranks.from) - kept).abs() <= 1.01, "{node:?} {kept}");
+                    fading += 1;
+                }
+            }
+        }
+    }
+    assert!(fading > 20, "{fading}");
 }
 
 #[test]

@@ -22,6 +22,8 @@ pub(crate) struct Wish {
     pub(crate) look: Look,
     /// Colours of the model or of its levels.
     pub(crate) tint: Tint,
+    /// Levels of hybrid models fade into each other.
+    pub(crate) cross_fade: bool,
     /// Error at rest, in pixels.
     pub(crate) finest_px: f32,
     /// Milliseconds of a frame while the camera moves.

@@ -116,6 +116,11 @@ impl Viewer {
                 ui.selectable_value(&mut settings.tint, Tint::Level, "levels");
             });
             ui.end_row();
+            let label = ui
+                .label("Levels")
+                .on_hover_text("Of meshes: how one level of detail becomes the next while the camera moves");
+            ui.checkbox(&mut settings.cross_fade, "cross-fade").labelled_by(label.id);
+            ui.end_row();
             let label = ui.label("Background");
             ui.color_edit_button_srgb(&mut settings.background).labelled_by(label.id);
             ui.end_row();

@@ -22,6 +22,8 @@ pub struct Settings {
     pub background: [u8; 3],
     /// Colours of the model, or one for each level of detail.
     pub tint: Tint,
+    /// Levels of hybrid models fade into each other.
+    pub cross_fade: bool,
     /// Error at rest, in pixels; `None` for what suits the models.
     pub finest_px: Option<f32>,
     /// Milliseconds of a frame while the camera moves.
@@ -47,6 +49,7 @@ impl Default for Settings {
             towards_light: None,
             background: [32, 32, 36],
             tint: Tint::Model,
+            cross_fade: false,
             finest_px: None,
             target_ms: 50.0,
             cpu_budget: 1 << 30,

@@ -185,6 +185,7 @@ impl Stage {
             self.most_splats = u64::MAX;
         }
         self.scene.set_tint(wish.tint);
+        self.scene.set_cross_fade(wish.cross_fade);
         (self.changed, self.stuck) = (true, false);
     }
 

@@ -70,6 +70,7 @@ impl Staged {
             camera: Camera::orbit(&self.bounds, UpAxis::Y, [azimuth_deg, 0.0], 1.0, 0.7, size),
             look: settings.look(),
             tint: settings.tint,
+            cross_fade: settings.cross_fade,
             finest_px: 1.0,
             target_ms: settings.target_ms,
             cpu_budget: settings.cpu_budget,

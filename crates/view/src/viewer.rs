@@ -245,9 +245,10 @@ impl Viewer {
         if self.models.is_empty() {
             return;
         }
-        let Settings { tint, target_ms, cpu_budget, gpu_budget, .. } = self.settings;
+        let Settings { tint, cross_fade, target_ms, cpu_budget, gpu_budget, .. } = self.settings;
         let (camera, finest_px) = (self.camera(viewpoint), self.finest_px());
-        let wish = Wish { camera, look: self.settings.look(), tint, finest_px, target_ms, cpu_budget, gpu_budget };
+        let look = self.settings.look();
+        let wish = Wish { camera, look, tint, cross_fade, finest_px, target_ms, cpu_budget, gpu_budget };
         if self.last_wish != Some(wish) {
             self.last_wish = Some(wish);
             self.wish_number += 1;

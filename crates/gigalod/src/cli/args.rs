@@ -222,6 +222,10 @@ pub(crate) struct DrawArgs {
     /// Colour each level of detail differently
     #[arg(long)]
     pub(crate) lod_colors: bool,
+    /// Let levels of hybrid models fade into each other, pixel by pixel: nothing pops where --error is more than half a pixel, and more
+    /// is drawn
+    #[arg(long)]
+    pub(crate) cross_fade: bool,
     /// Most memory for the model: decoded pages, and lists of what is drawn
     #[arg(long, default_value = "1GiB", value_parser = parse::size, allow_negative_numbers = true, value_name = "SIZE")]
     pub(crate) cpu_budget: u64,

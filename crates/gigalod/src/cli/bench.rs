@@ -94,6 +94,7 @@ pub(crate) fn run(args: &BenchArgs, console: &Console) -> Result<Outcome, CliErr
     let subject = Subject::open(&args.file, &args.build, console)?;
     let mut stage = Stage::open(&subject, args.draw.budgets())?;
     stage.scene.set_tint(args.draw.tint());
+    stage.scene.set_cross_fade(args.draw.cross_fade);
     let finest_px = args.draw.threshold_px(subject.default_error_px()) as f32;
     let look = args.draw.look(&subject.description);
     warm_up(&mut stage, &path, look, args, console)?;

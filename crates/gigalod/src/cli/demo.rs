@@ -92,7 +92,15 @@ pub(crate) fn run(args: &DemoArgs, console: &Console) -> Result<Outcome, CliErro
         let mut camera = Camera::orbit(&bounds, stage.up(), [azimuth, elevation], zoom, fov, size);
         camera.eye += bounds.extent() * 0.5 * shot.at;
         let look = Look::default();
-        let job = Job { camera, threshold_px: shot.threshold_px, look, tint: shot.tint, output: &picture, depth: None };
+        let job = Job {
+            camera,
+            threshold_px: shot.threshold_px,
+            look,
+            tint: shot.tint,
+            cross_fade: false,
+            output: &picture,
+            depth: None,
+        };
         let drawn = stage.draw(&built, &job, console)?;
         let _ = write!(text, "{}: {}", shot.shows, drawn.text);
     }

@@ -56,6 +56,7 @@ pub(crate) struct Job<'a> {
     pub(crate) threshold_px: f64,
     pub(crate) look: Look,
     pub(crate) tint: Tint,
+    pub(crate) cross_fade: bool,
     pub(crate) output: &'a Path,
     pub(crate) depth: Option<&'a Path>,
 }
@@ -78,6 +79,7 @@ pub(crate) fn run(args: &RenderArgs, console: &Console) -> Result<Outcome, CliEr
         threshold_px: args.draw.threshold_px(subject.default_error_px()),
         look: args.draw.look(&subject.description),
         tint: args.draw.tint(),
+        cross_fade: args.draw.cross_fade,
         output: &args.output,
         depth: args.depth.as_deref(),
     };
@@ -88,6 +90,7 @@ impl Stage {
     /// Draws one picture and writes it; `name` is what messages call the model.
     pub(crate) fn draw(&mut self, name: &Path, job: &Job<'_>, console: &Console) -> Result<Outcome, CliError> {
         self.scene.set_tint(job.tint);
+        self.scene.set_cross_fade(job.cross_fade);
         let wanted = Fineness::px(job.threshold_px as f32);
         let Drawn { report, select_ms, frame_ms, what: picture, .. } =
             self.draw_until(&job.camera, job.look, &wanted, Wait::Converged, Renderer::picture, console)?;

@@ -89,6 +89,7 @@ pub(crate) fn run(args: &ViewArgs, console: &Console) -> Result<Outcome, CliErro
             towards_light: look.lighting.towards_light,
             background: look.lighting.background,
             tint: args.draw.tint(),
+            cross_fade: args.draw.cross_fade,
             finest_px: args.draw.asked_px().map(|px| px as f32),
             target_ms: args.target_ms,
             cpu_budget: args.draw.cpu_budget,

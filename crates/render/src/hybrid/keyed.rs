@@ -112,7 +112,7 @@ impl HybridBuffers {
 /// The contents of the buffer of passes: all parameters, and last what a draw of large primitives begins with.
 pub(crate) fn pass_bytes(
     gpu: &Gpu,
-    (camera, middle_px): (&Camera, [f32; 2]),
+    (camera, middle_px, turn): (&Camera, [f32; 2], u32),
     bands: &Bands,
     plan: &Plan,
     compute_extent_px: u32,
@@ -131,6 +131,7 @@ pub(crate) fn pass_bytes(
                     first_run: slice.runs.start,
                     first_point_run: plan.first_runs[0],
                     first_line_run: plan.first_runs[1],
+                    turn,
                     ..HybridParams::new(camera, middle_px)
                 };
                 bytes.extend_from_slice(bytemuck::bytes_of(&params));

@@ -3,6 +3,7 @@
 use crate::splats::params::NEAR;
 use gigalod_format::hybrid::{NodeRecord, Skeleton};
 use gigalod_geom::Camera;
+use gigalod_runtime::hybrid::RANKS;
 use gigalod_runtime::{ModelView, Similarity};
 use glam::{DVec2, DVec3};
 
@@ -33,6 +34,9 @@ pub(crate) struct HybridParams {
     /// Runs of triangles come first, then those of points, then those of lines.
     pub(crate) first_point_run: u32,
     pub(crate) first_line_run: u32,
+    /// Added to the ranks of pixels, so that those of a pixel's samples differ.
+    pub(crate) turn: u32,
+    pub(crate) pad: u32,
 }
 
 impl HybridParams {
@@ -52,6 +56,8 @@ impl HybridParams {
             first_run: 0,
             first_point_run: 0,
             first_line_run: 0,
+            turn: 0,
+            pad: 0,
         }
     }
 }
@@ -77,7 +83,8 @@ pub(crate) struct NodeParams {
     /// Vertices of its page; points come after them.
     pub(crate) vertices: u32,
     pub(crate) forward: [f32; 3],
-    pub(crate) pad_b: u32,
+    /// Pixels that show it: of these ranks, from | end << 8.
+    pub(crate) ranks: u32,
     /// What brings steps from that point of the grid to the eye.
     pub(crate) to_eye: [f32; 3],
     pub(crate) pad_c: u32,
@@ -131,7 +138,7 @@ impl<'a> Seen<'a> {
             up: axis(camera.up),
             vertices: record.vertices,
             forward: axis(camera.forward),
-            pad_b: 0,
+            ranks: u32::from(RANKS) << 8,
             to_eye: (near_eye - eye).as_vec3().to_array(),
             pad_c: 0,
             model_x: in_world(DVec3::X),
@@ -201,7 +208,9 @@ mod tests {
                 compute_extent_px,
                 first_run,
                 first_point_run,
-                first_line_run
+                first_line_run,
+                turn,
+                pad
             ]
         );
         assert!(size_of::<HybridParams>() as u64 <= STRIDE);
@@ -212,6 +221,8 @@ mod tests {
         let text = include_str!("../shader/hybrid_store.wgsl");
         assert!(text.contains(&format!("const NODE_TEXELS: u32 = {NODE_TEXELS}u;")));
         assert!(text.contains(&format!("const RUN_LOG2: u32 = {RUN_LOG2}u;")));
+        let fade = include_str!("../shader/hybrid_fade.wgsl");
+        assert!(fade.contains(&format!("const RANKS: u32 = {RANKS}u;")));
         let at = |offset: usize| (offset / 16, offset % 16 / 4);
         use std::mem::offset_of;
         assert_eq!(at(offset_of!(NodeParams, positions_at)), (0, 3));
@@ -222,6 +233,7 @@ mod tests {
         assert_eq!(at(offset_of!(NodeParams, up)), (3, 0));
         assert_eq!(at(offset_of!(NodeParams, vertices)), (3, 3));
         assert_eq!(at(offset_of!(NodeParams, forward)), (4, 0));
+        assert_eq!(at(offset_of!(NodeParams, ranks)), (4, 3));
         assert_eq!(at(offset_of!(NodeParams, to_eye)), (5, 0));
         assert_eq!(at(offset_of!(NodeParams, model_x)), (6, 0));
         assert_eq!(at(offset_of!(NodeParams, normal_step)), (6, 3));

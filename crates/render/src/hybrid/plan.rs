@@ -156,6 +156,7 @@ impl Plan {
                     normals_at,
                     triangles_at,
                     borders_at: triangles_at + page.triangles.len() as u32,
+                    ranks: u32::from(node.ranks.from) | u32::from(node.ranks.end) << 8,
                     color: color(list.tint, record.level, !page.colors.is_empty()),
                     ..seen.node(record)
                 });

@@ -18,6 +18,7 @@ use crate::targets::Targets;
 use crate::{Gpu, GpuLevel, Look, RenderError, gbuffer, hybrid};
 use gigalod_geom::Camera;
 use gigalod_runtime::Interrupt;
+use gigalod_runtime::hybrid::RANKS;
 
 /// A frame that lies on the device, ready to be drawn.
 #[derive(Debug)]
@@ -76,7 +77,7 @@ impl Renderer {
             if interrupt.is_some_and(Interrupt::is_set) {
                 return Ok(false);
             }
-            let aimed = self.aimed_at(last, middle_px);
+            let aimed = self.aimed_at(last, middle_px, at as u32);
             aimed.send(&self.gpu, &mut self.staging, &self.buffers)?;
             let adding = Adding { is_first: at == 0, is_last: at as u32 + 1 == samples };
             if !self.draw_once(last, Some(adding), interrupt)? {
@@ -87,8 +88,8 @@ impl Renderer {
         Ok(true)
     }
 
-    /// What says where a pixel is looked at.
-    pub(super) fn aimed_at(&self, sent: &OnDevice, middle_px: [f32; 2]) -> Aimed {
+    /// What says where a pixel is looked at, and for the which time.
+    pub(super) fn aimed_at(&self, sent: &OnDevice, middle_px: [f32; 2], sample: u32) -> Aimed {
         let OnDevice { camera, look, bands, plan, hybrid, hybrid_bands, read_back, .. } = sent;
         let aim = (camera, middle_px);
         let passes = if self.gpu.level() > GpuLevel::WebGl {
@@ -98,7 +99,10 @@ impl Renderer {
         };
         let hybrid_passes = match hybrid.is_empty() {
             true => Vec::new(),
-            false => hybrid::keyed::pass_bytes(&self.gpu, aim, hybrid_bands, hybrid, self.hybrid_extent_px),
+            false => {
+                let aim = (camera, middle_px, sample * u32::from(RANKS) / look.samples);
+                hybrid::keyed::pass_bytes(&self.gpu, aim, hybrid_bands, hybrid, self.hybrid_extent_px)
+            }
         };
         let light = LightPass::params(camera, &look.lighting, middle_px, 1.0 / look.samples as f32);
         Aimed { passes, hybrid_passes, light }

@@ -26,6 +26,7 @@ var<private> frame: HybridParams;
 #import hybrid_triangle.wgsl
 #import hybrid_spots.wgsl
 #import hybrid_gaps.wgsl
+#import hybrid_fade.wgsl
 #import nearness.wgsl
 #import hybrid_target.wgsl
 #import splat_target.wgsl
@@ -218,7 +219,7 @@ fn draw_triangle(node: Node, index: u32, number: u32, share: u32, shares: u32, i
                 z = max(eye_off * (1.0 / dot3(normal, ray)), frame.near);
             }
             // Written so that what is no number is not drawn.
-            if is_inside && y >= window.y && y < window.w && z < 3e38 {
+            if is_inside && y >= window.y && y < window.w && z < 3e38 && shows_in(node, pixel) {
                 deliver(key_of(pixel), Meeting(z), Splat(number));
             }
         }
@@ -239,7 +240,7 @@ fn draw_spot(node: Node, index: u32, number: u32, share: u32, shares: u32, in_ti
             let pixel = vec2i(x, y);
             let z = depth_of_spot(spot, pixel);
             let is_inside = z > 0.0 && y >= window.y && y < window.w;
-            if is_inside && (kind == POINTS || is_gap(spot, pixel, z)) {
+            if is_inside && shows_in(node, pixel) && (kind == POINTS || is_gap(spot, pixel, z)) {
                 deliver(key_of(pixel), Meeting(z), Splat(number));
             }
         }

@@ -22,4 +22,7 @@ struct HybridParams {
     // Runs of triangles come first, then those of points, then those of lines.
     first_point_run: u32,
     first_line_run: u32,
+    // Added to the ranks of pixels, so that those of a pixel's samples differ.
+    turn: u32,
+    pad: u32,
 }

@@ -28,6 +28,7 @@ var<private> frame: HybridParams;
 #import hybrid_triangle.wgsl
 #import hybrid_spots.wgsl
 #import hybrid_gaps.wgsl
+#import hybrid_fade.wgsl
 #import nearness.wgsl
 #import hybrid_target.wgsl
 #import splat_target.wgsl
@@ -123,7 +124,7 @@ fn draw_triangle(node: Node, index: u32, number: u32) -> bool {
     var at = row;
     var pixel = window.xy;
     loop {
-        if (at.x | at.y | at.z) >= 0i {
+        if (at.x | at.y | at.z) >= 0i && shows_in(node, pixel) {
             let z = depth_in(flat, vec3f((at - off).yzx), whole);
             deliver(key_of(pixel), Meeting(z), Splat(number));
         }
@@ -160,7 +161,7 @@ fn draw_spot(node: Node, index: u32, number: u32) -> bool {
     var pixel = window.xy;
     loop {
         let z = depth_of_spot(spot, pixel);
-        if z > 0.0 && (kind == POINTS || is_gap(spot, pixel, z)) {
+        if z > 0.0 && shows_in(node, pixel) && (kind == POINTS || is_gap(spot, pixel, z)) {
             deliver(key_of(pixel), Meeting(z), Splat(number));
         }
         pixel.x++;

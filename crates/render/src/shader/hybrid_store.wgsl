@@ -34,6 +34,8 @@ struct Node {
     forward: vec3f,
     // What brings steps from that point of the grid to the eye.
     to_eye: vec3f,
+    // Pixels that show it: of these ranks, from | end << 8.
+    ranks: u32,
 }
 
 struct Run {
@@ -69,6 +71,7 @@ fn node_at(at: u32) -> Node {
     out.vertices = up.w;
     out.up = bitcast<vec3f>(up.xyz);
     out.forward = bitcast<vec3f>(forward.xyz);
+    out.ranks = forward.w;
     out.to_eye = bitcast<vec3f>(to_eye.xyz);
     return out;
 }

@@ -3,6 +3,7 @@
 //! What always holds: nodes stand in ascending order of their numbers; a page is that of its node; the page of a node that is drawn
 //! stays alive with the list, whatever residency does.
 
+use super::fade::Ranks;
 use crate::FileId;
 use crate::splats::Tint;
 use gigalod_format::hybrid::{HybridFile, NodeId, Page};
@@ -30,6 +31,8 @@ pub struct HybridNode {
     pub page: Arc<Page>,
     /// True where neighbours may have been simplified otherwise, so that gaps along its border must be closed by lines.
     pub draws_lines: bool,
+    /// Which pixels show it.
+    pub ranks: Ranks,
 }
 
 impl Default for HybridList {
@@ -54,7 +57,8 @@ impl HybridList {
 /// Equal are lists of the same nodes of the same model, drawn alike.
 impl PartialEq for HybridList {
     fn eq(&self, other: &Self) -> bool {
-        let is_same = |(a, b): (&HybridNode, &HybridNode)| a.node == b.node && a.draws_lines == b.draws_lines;
+        let is_same =
+            |(a, b): (&HybridNode, &HybridNode)| (a.node, a.draws_lines, a.ranks) == (b.node, b.draws_lines, b.ranks);
         self.file == other.file
             && self.tint == other.tint
             && self.nodes.len() == other.nodes.len()

@@ -1,11 +1,12 @@
 //! The cut: from the root to what is drawn no farther off than asked for.
 //!
-//! What always holds, whatever the file says: each leaf lies below exactly one node that is drawn or culled; a cut looks at no more
+//! What always holds, whatever the file says: of each rank of pixels, each leaf lies below exactly one node that is drawn or culled; a cut looks at no more
 //! nodes than there are; it never waits. A node that is too coarse is drawn nevertheless where a child in sight is not resident.
 //!
 //! A hierarchy has a node for some thousand triangles, so a cut looks at thousands of nodes where that of splats looks at millions:
 //! one thread and no tricks.
 
+use super::fade::Ranks;
 use super::family::{Family, Inconsistent};
 use super::look::{Look, Sight};
 use super::{HybridList, HybridNode};
@@ -29,8 +30,10 @@ pub struct HybridSelector {
     pub cutting: Cutting,
     /// How to colour.
     pub tint: Tint,
+    /// From where on a node fades into its children, as a share of the threshold; 0 for no fades. See [`super::CROSS_FADE`].
+    pub cross_fade: f32,
     // Kept so that a warm cut allocates nothing.
-    stack: Vec<Sight>,
+    stack: Vec<(Sight, Ranks)>,
     counted: Vec<Counted>,
 }
 
@@ -54,6 +57,7 @@ struct Walk<'a> {
     room_bytes: u64,
     /// Finest level of what is drawn.
     deepest: u32,
+    cross_fade: f32,
 }
 
 impl Selector for HybridSelector {
@@ -78,6 +82,7 @@ impl Selector for HybridSelector {
                 report: out.report,
                 room_bytes: input.room_bytes,
                 deepest: 0,
+                cross_fade: self.cross_fade,
             };
             outcome = match walk.run(&mut self.stack) {
                 Ok(()) => Outcome::Complete,
@@ -99,7 +104,7 @@ impl Selector for HybridSelector {
 impl HybridSelector {
     /// Bytes that it keeps.
     pub fn bytes(&self) -> u64 {
-        (self.stack.capacity() * size_of::<Sight>() + self.counted.capacity() * size_of::<Counted>()) as u64
+        (self.stack.capacity() * size_of::<(Sight, Ranks)>() + self.counted.capacity() * size_of::<Counted>()) as u64
     }
 
     /// Counts triangles and points of a hierarchy for a budget. False where it was broken off.
@@ -116,6 +121,7 @@ impl HybridSelector {
             if look.is_hidden(record) { 0 } else { primitives(record) }
         };
         search.add_root(drawn(root));
+        let fades = 1.0 / (1.0 - self.cross_fade);
         let mut visited = 0;
         self.counted.clear();
         self.counted.push(Counted { sight: root, least_px: f32::INFINITY });
@@ -125,12 +131,13 @@ impl HybridSelector {
                 return false;
             }
             let is_raised = search.threshold_px() > input.wanted_px;
-            if is_raised && least_px <= search.threshold_px() {
+            if is_raised && least_px * fades <= search.threshold_px() {
                 continue;
             }
             let record = look.record(sight);
             let pressing_px = pressing_px(sight, record, &look, (table, frame));
-            let opens_px = if is_raised { pressing_px } else { sight.error_px };
+            // Its children are there as soon as it begins to fade into them.
+            let opens_px = if is_raised { pressing_px } else { sight.error_px } * fades;
             let family = match record.children > 0 && opens_px > search.threshold_px() {
                 true => Family::of(sight.node, record, &look, skeleton, (table, frame)).ok(),
                 false => None,
@@ -140,9 +147,15 @@ impl HybridSelector {
                 search.add_drawn(drawn(sight));
                 continue;
             };
+            // While it fades it is drawn as well.
+            if opens_px <= search.threshold_px() * fades {
+                search.add_drawn(drawn(sight));
+            }
+            let least_above_px = least_px;
             let least_px = least_px.min(pressing_px);
             let below: u64 = family.seen().iter().map(|child| drawn(*child)).sum();
-            search.add(least_px, below as i64 - drawn(sight) as i64);
+            search.add(least_px * fades, below as i64);
+            search.add(pressing_px.min(least_above_px * fades), -(drawn(sight) as i64));
             self.counted.extend(family.seen().iter().map(|child| Counted { sight: *child, least_px }));
             search.raise_if_too_many();
         }
@@ -161,7 +174,7 @@ fn pressing_px(sight: Sight, record: &NodeRecord, look: &Look<'_>, (table, _): (
 }
 
 impl Walk<'_> {
-    fn run(&mut self, stack: &mut Vec<Sight>) -> Result<(), Outcome> {
+    fn run(&mut self, stack: &mut Vec<(Sight, Ranks)>) -> Result<(), Outcome> {
         let key = |node| PageKey { file: self.input.file, page: NodeId(node).into() };
         self.report.visited = 1;
         let Some(root) = self.look.root() else {
@@ -176,14 +189,14 @@ impl Walk<'_> {
             return self.interrupted();
         }
         stack.clear();
-        stack.push(root);
+        stack.push((root, Ranks::ALL));
         let mut next_check = CHECK_NODES;
-        while let Some(sight) = stack.pop() {
+        while let Some(item) = stack.pop() {
             if self.report.visited >= next_check {
                 next_check = self.report.visited + CHECK_NODES;
                 self.interrupted()?;
             }
-            if self.visit(sight, stack)?.is_err() {
+            if self.visit(item, stack)?.is_err() {
                 self.report.inconsistent = true;
                 break;
             }
@@ -196,16 +209,27 @@ impl Walk<'_> {
         if self.input.interrupt.is_set() { Err(Outcome::Interrupted) } else { Ok(()) }
     }
 
-    /// Opens a node, draws it or leaves it out.
-    fn visit(&mut self, sight: Sight, stack: &mut Vec<Sight>) -> Result<Result<(), Inconsistent>, Outcome> {
+    /// Opens a node, draws it or leaves it out, in pixels of some ranks; where it is nearly too coarse, it is opened in some of these.
+    fn visit(
+        &mut self,
+        (sight, ranks): (Sight, Ranks),
+        stack: &mut Vec<(Sight, Ranks)>,
+    ) -> Result<Result<(), Inconsistent>, Outcome> {
         let record = self.look.record(sight);
         let SelectInput { threshold_px, wanted_px, .. } = *self.input;
         let is_coarse = sight.error_px > threshold_px;
         let mut limit = is_coarse.then_some(Limit::Data);
-        let waits = || pressing_px(sight, record, &self.look, self.table) <= threshold_px;
-        if is_coarse && record.children > 0 && threshold_px > wanted_px && waits() {
+        let opens_px = match record.children > 0 && threshold_px > wanted_px {
+            true => pressing_px(sight, record, &self.look, self.table),
+            false => sight.error_px,
+        };
+        let [given, mut kept] = ranks.shared(opens_px, threshold_px, self.cross_fade);
+        if is_coarse && opens_px <= threshold_px {
             limit = Some(Limit::Budget);
-        } else if is_coarse && record.children > 0 {
+        }
+        if record.children == 0 || given.is_empty() {
+            kept = ranks;
+        } else {
             match Family::of(sight.node, record, &self.look, self.file.skeleton(), self.table) {
                 Ok(family) => {
                     self.report.visited += family.len();
@@ -215,21 +239,24 @@ impl Walk<'_> {
                     if !family.is_missing {
                         self.report.culled_frustum += family.outside;
                         // Backwards, so that the first is visited first.
-                        stack.extend(family.seen().iter().rev());
-                        return Ok(Ok(()));
+                        stack.extend(family.seen().iter().rev().map(|child| (*child, given)));
+                        if kept.is_empty() {
+                            return Ok(Ok(()));
+                        }
+                    } else {
+                        self.request(sight, &family);
+                        (limit, kept) = (is_coarse.then_some(Limit::Residency), ranks);
                     }
-                    self.request(sight, &family);
-                    limit = Some(Limit::Residency);
                 }
                 // Without them it is as good as a leaf.
-                Err(Inconsistent) => self.report.inconsistent = true,
+                Err(Inconsistent) => (self.report.inconsistent, kept) = (true, ranks),
             }
         }
         if self.look.is_hidden(record) {
             self.report.culled_backface += 1;
             return Ok(Ok(()));
         }
-        self.draw(sight, record, limit).map(Ok)
+        self.draw((sight, kept), record, limit).map(Ok)
     }
 
     /// Asks for the children in sight that are not there.
@@ -242,7 +269,12 @@ impl Walk<'_> {
         }));
     }
 
-    fn draw(&mut self, sight: Sight, record: &NodeRecord, limit: Option<Limit>) -> Result<(), Outcome> {
+    fn draw(
+        &mut self,
+        (sight, ranks): (Sight, Ranks),
+        record: &NodeRecord,
+        limit: Option<Limit>,
+    ) -> Result<(), Outcome> {
         let node = NodeId(sight.node);
         // What is drawn was found resident when its parent was opened.
         let Some(page) = self.table.0.used_shared(node, self.table.1).cloned() else { return Ok(()) };
@@ -264,7 +296,7 @@ impl Walk<'_> {
             return Err(Outcome::NoRoom);
         }
         self.deepest = self.deepest.max(record.level);
-        self.list.nodes.push(HybridNode { node, page, draws_lines: record.borders > 0 });
+        self.list.nodes.push(HybridNode { node, page, draws_lines: record.borders > 0, ranks });
         Ok(())
     }
 

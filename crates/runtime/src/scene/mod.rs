@@ -3,6 +3,7 @@
 mod budget;
 pub mod description;
 
+use crate::hybrid::CROSS_FADE;
 use crate::residency::{FileId, PageRequest, Residency};
 use crate::selection::{DrawSource, Selection, Selector, Target};
 use crate::splats::{ThresholdSearch, Tint};
@@ -99,6 +100,11 @@ impl Scene {
     /// How everything is coloured.
     pub fn set_tint(&mut self, tint: Tint) {
         (self.splats.tint, self.hybrid.tint) = (tint, tint);
+    }
+
+    /// Whether levels of hybrid hierarchies fade into each other, pixel by pixel, where they are nearly too coarse.
+    pub fn set_cross_fade(&mut self, fades: bool) {
+        self.hybrid.cross_fade = if fades { CROSS_FADE } else { 0.0 };
     }
 
     /// What is resident.

@@ -25,6 +25,7 @@ impl Stage {
         }
         if let Some((_, wish)) = self.wish {
             self.scene.set_tint(wish.tint);
+            self.scene.set_cross_fade(wish.cross_fade);
         }
     }
 
@@ -54,6 +55,7 @@ impl Stage {
         let room = self.renderer.most_splats(wish.camera.size, &wish.look);
         let fineness = Fineness { most_splats: self.most_splats.min(room), ..Fineness::px(wish.finest_px) };
         self.scene.set_tint(wish.tint);
+        self.scene.set_cross_fade(wish.cross_fade);
         self.cut = None;
         loop {
             let report = self.scene.select_interruptible(CAMERA, &wish.camera, &fineness, &interrupt);
