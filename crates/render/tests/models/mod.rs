@@ -6,7 +6,7 @@ use gigalod_format::{Bounds, Container, InputCounts, Kind, MemoryStore, Metadata
 use gigalod_geom::Aabb;
 use gigalod_geom::camera::UpAxis;
 use gigalod_reference::Mesh;
-use gigalod_runtime::hybrid::{HybridList, HybridNode};
+use gigalod_runtime::hybrid::{HybridList, HybridNode, Ranks};
 use gigalod_runtime::splats::Tint;
 use gigalod_runtime::{DrawSource, FileId};
 use glam::{DVec3, Vec3};
@@ -252,6 +252,7 @@ impl Model {
             node: NodeId(self.first + at as u32),
             page: page.clone(),
             draws_lines,
+            ranks: Ranks::ALL,
         };
         DrawSource::Hybrid(HybridList {
             file: FileId(file),
