@@ -15,6 +15,7 @@ use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// How far a box reaches beyond its triangles, in units of half the mesh's longest side: four steps of `f32` at 1, of which
 /// rounding to `f32` may take one back.
@@ -24,10 +25,15 @@ const PADDING: f64 = 1.0 / (1u32 << 22) as f64;
 const LEAF_TRIANGLES: u32 = 8;
 const TRAVERSAL_COST: f32 = 3.0;
 
+/// Triangles that a hierarchy is made of at once: making it takes several times the memory that it keeps.
+const MOST_AT_ONCE: u32 = 1 << 23;
+
 /// A bounding volume hierarchy over the triangles of a mesh.
 pub struct Bvh<'m> {
     mesh: &'m Mesh,
     nodes: Vec<Bvh2Node>,
+    /// Of hierarchies, each of a part of the triangles.
+    roots: Vec<u32>,
     /// Triangle indices; a leaf names a range of them.
     triangles: Vec<u32>,
     unit_box: UnitBox,
@@ -58,19 +64,36 @@ pub struct NearestPoint {
 impl<'m> Bvh<'m> {
     /// Builds the hierarchy. A mesh without triangles gives one that nothing meets.
     pub fn build(mesh: &'m Mesh) -> Self {
+        Self::with_parts_of(mesh, MOST_AT_ONCE)
+    }
+
+    fn with_parts_of(mesh: &'m Mesh, most_at_once: u32) -> Self {
         let unit_box = UnitBox::around(mesh);
         let triangle_count = u32::try_from(mesh.triangles().len()).expect("Mesh::new bounds the number of triangles");
+        let mut bvh = Self { mesh, nodes: Vec::new(), roots: Vec::new(), triangles: Vec::new(), unit_box };
+        for first in (0..triangle_count).step_by(most_at_once as usize) {
+            bvh.add(first..triangle_count.min(first.saturating_add(most_at_once)));
+        }
+        bvh
+    }
+
+    /// Adds a hierarchy of some triangles.
+    fn add(&mut self, triangles: Range<u32>) {
+        let first = triangles.start;
         let boxes: Vec<BoxF32> =
-            (0..triangle_count).into_par_iter().map(|triangle| unit_box.padded_box(mesh.corners(triangle))).collect();
-        let mut hierarchy = PlocBuilder::with_capacity(boxes.len()).build(
-            PlocSearchDistance::Low,
-            &boxes,
-            (0..triangle_count).collect(),
-            SortPrecision::U64,
-            2,
-        );
+            triangles.into_par_iter().map(|triangle| self.unit_box.padded_box(self.mesh.corners(triangle))).collect();
+        let indices = (0..boxes.len() as u32).collect();
+        let mut builder = PlocBuilder::with_capacity(boxes.len());
+        let mut hierarchy = builder.build(PlocSearchDistance::Low, &boxes, indices, SortPrecision::U64, 2);
+        drop(boxes);
         collapse(&mut hierarchy, LEAF_TRIANGLES, TRAVERSAL_COST);
-        Self { mesh, nodes: hierarchy.nodes, triangles: hierarchy.primitive_indices, unit_box }
+        let (first_node, first_index) = (self.nodes.len() as u32, self.triangles.len() as u32);
+        self.roots.push(first_node);
+        self.nodes.extend(hierarchy.nodes.into_iter().map(|mut node| {
+            node.first_index += if node.is_leaf() { first_index } else { first_node };
+            node
+        }));
+        self.triangles.extend(hierarchy.primitive_indices.into_iter().map(|triangle| first + triangle));
     }
 
     /// The mesh it was built over.
@@ -147,9 +170,8 @@ impl<'m> Bvh<'m> {
     /// looks at one triangle and returns the bound that a box must not exceed from now on; `bound` is that to begin with.
     fn visit(&self, mut bound: f64, entry: impl Fn(&BoxF32) -> Option<f64>, mut visit: impl FnMut(u32) -> f64) {
         let mut open: Vec<(f64, u32)> = Vec::with_capacity(64);
-        if let Some(root) = self.nodes.first() {
-            open.extend(entry(root.aabb()).map(|at| (at, 0)));
-        }
+        open.extend(self.roots.iter().filter_map(|root| Some((entry(self.nodes[*root as usize].aabb())?, *root))));
+        open.sort_unstable_by(|(a, _), (b, _)| b.total_cmp(a));
         while let Some((at, index)) = open.pop() {
             if at > bound {
                 continue;
@@ -274,8 +296,9 @@ mod tests {
 
         #[test]
         fn first_hit_is_that_of_brute_force(
-            mesh in triangle_soup(), rays in prop::collection::vec((coordinates(), coordinates()), 20)) {
-            let bvh = Bvh::build(&mesh);
+            mesh in triangle_soup(), most_at_once in 7u32..200,
+            rays in prop::collection::vec((coordinates(), coordinates()), 20)) {
+            let bvh = Bvh::with_parts_of(&mesh, most_at_once);
             let (center, size) = (mesh.bounds().center(), mesh.bounds().extent().max_element() * 0.25);
             for (from, direction) in rays {
                 let ray = Ray { origin: center + from * size, direction };
@@ -288,8 +311,8 @@ mod tests {
 
         #[test]
         fn nearest_point_is_that_of_brute_force(
-            mesh in triangle_soup(), points in prop::collection::vec(coordinates(), 20)) {
-            let bvh = Bvh::build(&mesh);
+            mesh in triangle_soup(), most_at_once in 7u32..200, points in prop::collection::vec(coordinates(), 20)) {
+            let bvh = Bvh::with_parts_of(&mesh, most_at_once);
             let (center, size) = (mesh.bounds().center(), mesh.bounds().extent().max_element() * 0.5);
             let mut first = 0;
             for point in points.iter().map(|point| center + *point * size) {
