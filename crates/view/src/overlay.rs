@@ -34,7 +34,7 @@ const HELP: [(&str, &str); 19] = [
     ("F2", "hide the panel, and show it"),
     ("F5", "open the graphics device anew"),
     ("F1", "this help"),
-    ("Esc", "leave help and measuring"),
+    ("Esc", "leave help, measuring and the list of files"),
     ("Ctrl+Q", "close the window"),
 ];
 

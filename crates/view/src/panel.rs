@@ -114,12 +114,9 @@ impl Viewer {
             ui.horizontal(|ui| {
                 ui.selectable_value(&mut settings.tint, Tint::Model, "model");
                 ui.selectable_value(&mut settings.tint, Tint::Level, "levels");
+                let fades = ui.checkbox(&mut settings.cross_fade, "cross-fade");
+                fades.on_hover_text("Levels of meshes fade into each other while the camera moves; more is drawn");
             });
-            ui.end_row();
-            let label = ui
-                .label("Levels")
-                .on_hover_text("Of meshes: how one level of detail becomes the next while the camera moves");
-            ui.checkbox(&mut settings.cross_fade, "cross-fade").labelled_by(label.id);
             ui.end_row();
             let label = ui.label("Background");
             ui.color_edit_button_srgb(&mut settings.background).labelled_by(label.id);

@@ -27,6 +27,10 @@ fn a_file_that_cannot_be_opened_is_told_and_a_folder_is_a_choice() {
     person.clicks_on("statue.glod");
     person.waits_until(|viewer| viewer.models.len() == 1);
     assert!(person.harness.query_by_label("other.ply").is_none(), "the choice is made");
+    let mut another = Person::opens(&["folder"]);
+    another.presses(egui::Key::Escape);
+    another.harness.run_steps(2);
+    assert!(another.harness.query_by_label("other.ply").is_none(), "or none is");
 }
 
 /// A file that is let go over the window.

@@ -67,8 +67,10 @@ impl Viewer {
         }
         // An open list is closed by it, and nothing else.
         if !egui::Popup::is_any_open(ui.ctx()) && pressed(Key::Escape) {
-            (self.shows_help, self.measuring.is_on) = (false, false);
-            self.measuring.clear();
+            if self.folder.take().is_none() {
+                (self.shows_help, self.measuring.is_on) = (false, false);
+                self.measuring.clear();
+            }
         }
         self.fly(ui, now);
     }

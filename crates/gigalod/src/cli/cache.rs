@@ -65,7 +65,10 @@ pub(crate) fn find(
     if cached.is_file() && files::open_built(&cached).is_ok() && names_the_same(file, &list_of(&cached)) {
         return Ok(Found::Built(cached));
     }
-    std::fs::create_dir_all(&folder).map_err(|error| CliError::in_file(&folder, error))?;
+    std::fs::create_dir_all(&folder).map_err(|error| {
+        let what = format!("could not make the cache of built models: {error}");
+        CliError::in_file(&folder, what).hint("XDG_CACHE_HOME says where it lies")
+    })?;
     Ok(Found::NotBuilt(cached))
 }
 

@@ -262,7 +262,13 @@ pub(crate) fn write(path: &Path, scene: &SceneDescription) -> Result<(), CliErro
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder.canonicalize().map_err(|error| CliError::write(path, &error))?;
     let name = |file: &Path| -> Result<String, CliError> {
-        let file = file.canonicalize().map_err(|error| CliError::in_file(file, error))?;
+        // A link keeps its own name: that is the one which goes where the folder goes.
+        let found = file.canonicalize().map_err(|error| CliError::in_file(file, error))?;
+        let beside = file.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let file = match (beside.canonicalize(), file.file_name()) {
+            (Ok(beside), Some(name)) => beside.join(name),
+            _ => found,
+        };
         let name = file.strip_prefix(&folder).unwrap_or(&file);
         let name = name.to_str().ok_or_else(|| CliError::in_file(&file, "a name that is not UTF-8"))?;
         Ok(toml::Value::from(name).to_string())
@@ -378,6 +384,20 @@ mod tests {
             let error = places(&Places::Many(path.clone())).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_its_folder_is_named_as_it_is_called_there() {
+        let [folder, other] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+        let (file, link) = (other.path().join("model.glod"), folder.path().join("link.glod"));
+        std::fs::write(&file, "").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        let model = |file| SceneModel { file, places: Places::One(Similarity::IDENTITY) };
+        let path = folder.path().join("scene.toml");
+        write(&path, &SceneDescription { models: vec![model(link), model(file)], ..Default::default() }).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("file = \"link.glod\"") && text.contains("/model.glod\""), "{text}");
     }
 
     fn any_vector() -> impl Strategy<Value = DVec3> {
