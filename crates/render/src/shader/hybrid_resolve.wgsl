@@ -96,7 +96,10 @@ fn resolve(@builtin(position) position: vec4f) -> Surface {
     let looks = array(page_word(node.normals_at + corners.x), page_word(node.normals_at + corners.y), page_word(node.normals_at + corners.z));
     let normal = normal_of(looks[0].x, per_step) * shares.x + normal_of(looks[1].x, per_step) * shares.y
         + normal_of(looks[2].x, per_step) * shares.z;
-    let turned = select(normal, -normal, is_triangle && is_back(node, corners, normal));
+    // What fills a gap is seen from the side that its neighbours are seen from; lines have no side but that of their normals.
+    let is_line = !is_triangle && kind == LINES;
+    let shows_back = is_line && dot3(normal, steps_of(node, corners.x)) > 0.0;
+    let turned = select(normal, -normal, shows_back || (is_triangle && is_back(node, corners, normal)));
     let model_x = bitcast<vec3f>(look.xyz);
     let model_y = bitcast<vec3f>(turn.xyz);
     let in_world = model_x * turned.x + model_y * turned.y + cross3(model_x, model_y) * turned.z;
