@@ -66,11 +66,12 @@ impl Viewer {
             *toggled ^= pressed(key);
         }
         // An open list is closed by it, and nothing else.
-        if !egui::Popup::is_any_open(ui.ctx()) && pressed(Key::Escape) {
-            if self.folder.take().is_none() {
-                (self.shows_help, self.measuring.is_on) = (false, false);
-                self.measuring.clear();
-            }
+        let leaves = !egui::Popup::is_any_open(ui.ctx()) && pressed(Key::Escape);
+        if leaves && self.folder.is_some() {
+            self.folder = None;
+        } else if leaves {
+            (self.shows_help, self.measuring.is_on) = (false, false);
+            self.measuring.clear();
         }
         self.fly(ui, now);
     }
