@@ -19,8 +19,8 @@ cargo xtask COMMAND
 
   demo [ARGS]   make a statue of 2 million triangles, build it, draw four pictures into ./demo
   test          everything CI runs: format, lints, documentation, tests, shaders, web build
-  bench [--large] [--only importing|building|drawing|hybrid]  measure against the targets, write docs/benchmarks.md (about 20 minutes;
-                with 100 M triangles 30)
+  bench [--large] [--only importing|building|drawing|hybrid]  measure against the targets, write docs/benchmarks.md (with
+                100 M triangles two hours, most of them for hybrid)
   soak [--triangles N] [--largest]  what takes too long for `test`: 50 kills of a build of 5 million triangles; a minute of
                 fuzzing each reader; memory, disk and verify of 100 million triangles (or N ≥ 10 million), written to docs/soak.md;
                 with 372 million as well, which needs 30 GB of disk
