@@ -18,6 +18,7 @@
 mod cell;
 mod cover;
 mod cut;
+mod edges;
 mod growth;
 mod looks;
 mod nodes;

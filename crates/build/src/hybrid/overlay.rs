@@ -305,6 +305,9 @@ impl Overlay {
             let least = shares[0].min(shares[1]).min(shares[2]);
             if least > best.0 {
                 best = (least, number, shares);
+                if least >= 0.0 {
+                    break;
+                }
             }
         }
         let [a, b, c] = best.2.map(|share| share.max(0.0));

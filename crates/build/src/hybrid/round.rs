@@ -5,9 +5,13 @@ use super::cell::Cell;
 use super::patch::{Face, Patch, Vertex, total};
 use super::points::Small;
 use super::simplify::up;
+use super::weld::PlaceHasher;
 use gigalod_format::hybrid::{NodeRecord, Page};
 use glam::{DVec3, Vec3};
-use std::collections::BTreeSet;
+use std::collections::HashSet;
+use std::hash::BuildHasherDefault;
+
+type Hashed<K> = HashSet<K, BuildHasherDefault<PlaceHasher>>;
 
 /// A node that is finished, but for its place in the file.
 #[derive(Clone, Debug)]
@@ -135,8 +139,9 @@ impl<'a> Bare<'a> {
         if flattened.is_empty() {
             return bare;
         }
-        let mut places: BTreeSet<[i32; 3]> = placed.iter().map(|(at, _)| *at).collect();
-        let mut edges: BTreeSet<[[i32; 3]; 2]> = BTreeSet::new();
+        let mut places: Hashed<[i32; 3]> = placed.iter().map(|(at, _)| *at).collect();
+        let mut edges: Hashed<[[i32; 3]; 2]> = Hashed::default();
+        edges.reserve(page.triangles.len() * 3 / 2);
         for triangle in &page.triangles {
             let [a, b, c] = triangle.map(|corner| placed[corner as usize].0);
             edges.extend([[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]));

@@ -9,6 +9,7 @@
 mod operation;
 
 use super::cover::Cover;
+use super::edges::{self, Side};
 use super::looks::Looks;
 use super::overlay::{Overlay, Verdict};
 use super::patch::{Patch, Vertex};
@@ -17,7 +18,7 @@ use super::surface::Surface;
 use glam::DVec3;
 use operation::Star;
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap};
+use std::collections::{BinaryHeap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 
 /// What a result may be off by.
@@ -37,26 +38,22 @@ const PLACE_WEIGHT: f64 = 1e-5;
 const LENGTH_WEIGHT: f64 = 1e-7;
 /// Operations are not tried whose quadric says that planes are so many times the limit away, in the mean of squares.
 const HOPELESS: f64 = 1.0;
-/// Passes over all edges; each takes what the one before it made possible.
-const MOST_PASSES: usize = 3;
-/// A pass that gains less than this share is the last.
-const LEAST_GAIN: f64 = 0.02;
+/// Nor those at faces whose error of appearance is so much of the limit: of ten, one would succeed, and others do in its place.
+const HOPELESS_LOOK: f64 = 0.9;
 
 /// Simplifies; what cannot be done within the limit is not done.
 pub(super) fn simplify(patch: Patch, limit: Limit) -> Patch {
-    let mut work = Work::new(patch, limit);
-    for _ in 0..MOST_PASSES {
-        let before = work.surface.left;
-        work.pass();
-        if ((before - work.surface.left) as f64) < LEAST_GAIN * before as f64 {
-            break;
-        }
-    }
+    let surface = Surface::new(patch);
+    let sides = edges::sides(surface.vertices.len(), surface.there());
+    let mut work = Work::new(surface, limit);
+    work.weigh(&sides);
+    work.try_all(&sides);
     work.surface.into_patch()
 }
 
-/// An edge that may collapse.
-type Candidate = Reverse<(u64, u32, u32, u32, u32)>;
+/// An edge that may collapse, and when: from the top, 32 bits each, the first bits of its cost as `f64`, its ends, and the sum of their stamps.
+/// One number, since most of what happens to them is that two are compared.
+type Candidate = u128;
 
 struct Work {
     surface: Surface,
@@ -68,16 +65,13 @@ struct Work {
     on_border: Vec<bool>,
     /// Counts changes of a vertex.
     stamps: Vec<u32>,
-    /// Counts operations.
-    clock: u32,
-    /// When a face of a vertex last changed.
-    changed: Vec<u32>,
-    /// When edges were last tried in vain.
-    failed: HashMap<u64, u32, BuildHasherDefault<EdgeHasher>>,
+    /// Edges that were tried in vain, which are not tried again: of 50 that are, one succeeds.
+    failed: HashSet<u64, BuildHasherDefault<EdgeHasher>>,
     /// Vertices that the patch had, and their errors of appearance.
     bases: Vec<Option<f32>>,
     looks: Looks,
-    queue: BinaryHeap<Candidate>,
+    /// Of edges that have changed.
+    queue: BinaryHeap<Reverse<Candidate>>,
     overlay: Overlay,
     cover: Cover,
     star: Star,
@@ -93,33 +87,28 @@ struct Operation {
 }
 
 impl Work {
-    fn new(patch: Patch, limit: Limit) -> Self {
-        let anchor = patch.vertices.first().map_or(DVec3::ZERO, |vertex| vertex.at);
-        let surface = Surface::new(patch);
+    fn new(surface: Surface, limit: Limit) -> Self {
+        let anchor = surface.vertices.first().map_or(DVec3::ZERO, |vertex| vertex.at);
         let (vertices, faces) = (surface.vertices.len(), surface.faces.len());
-        let mut work = Self {
+        Self {
             limit,
             quadrics: vec![Quadric::default(); vertices],
             anchor,
             on_border: vec![false; vertices],
             stamps: vec![0; vertices],
-            clock: 0,
-            changed: vec![0; vertices],
-            failed: HashMap::default(),
+            failed: HashSet::default(),
             bases: vec![Some(0.0); vertices],
             looks: Looks::new(faces),
             queue: BinaryHeap::new(),
             overlay: Overlay::default(),
             cover: Cover::default(),
-            star: Star::default(),
+            star: Star::new(vertices),
             surface,
-        };
-        work.weigh();
-        work
+        }
     }
 
     /// Quadrics, borders, and errors of appearance at vertices.
-    fn weigh(&mut self) {
+    fn weigh(&mut self, sides: &[Side]) {
         let Self { surface, quadrics, anchor, on_border, bases, .. } = self;
         for (number, face) in surface.faces.iter().enumerate() {
             if !surface.is_there(number as u32) {
@@ -138,10 +127,8 @@ impl Work {
                 *base = base.map(|base: f32| base.max(face.app));
             }
         }
-        for ([a, b], faces, face) in edges_of(surface) {
-            if faces == 2 {
-                continue;
-            }
+        for same in edges::by_edge(sides).filter(|same| same.len() != 2) {
+            let Side { ends: [a, b], face, .. } = same[0];
             on_border[a as usize] = true;
             on_border[b as usize] = true;
             let [p, q] = [a, b].map(|vertex| surface.vertices[vertex as usize].at - *anchor);
@@ -156,23 +143,32 @@ impl Work {
         }
     }
 
-    /// Tries all edges, and those that change on the way.
-    fn pass(&mut self) {
-        self.queue.clear();
-        let candidates: Vec<Candidate> =
-            edges_of(&self.surface).into_iter().filter_map(|([a, b], ..)| self.candidate(a, b)).collect();
-        self.queue = BinaryHeap::from(candidates);
-        while let Some(Reverse((_, a, b, stamp_a, stamp_b))) = self.queue.pop() {
-            if self.stamps[a as usize] == stamp_a && self.stamps[b as usize] == stamp_b {
+    /// Tries all edges, and those that there come to be.
+    fn try_all(&mut self, sides: &[Side]) {
+        let mut first: Vec<Candidate> = edges::by_edge(sides).filter_map(|same| self.candidate(same[0].ends)).collect();
+        first.sort_unstable_by_key(|candidate| Reverse(*candidate));
+        loop {
+            let is_changed_next = match (first.last(), self.queue.peek()) {
+                (Some(old), Some(Reverse(changed))) => changed < old,
+                (old, _) => old.is_none(),
+            };
+            let next = if is_changed_next { self.queue.pop().map(|Reverse(next)| next) } else { first.pop() };
+            let Some(candidate) = next else { break };
+            let (a, b, stamps) = ((candidate >> 64) as u32, (candidate >> 32) as u32, candidate as u32);
+            if self.stamp(a, b) == stamps {
                 self.collapse(a, b);
             }
         }
     }
 
-    /// None where it is not worth a try: for its cost, or because nothing has changed since it failed.
-    fn candidate(&self, a: u32, b: u32) -> Option<Candidate> {
-        let failed = self.failed.get(&(u64::from(a) << 32 | u64::from(b)));
-        if failed.is_some_and(|clock| self.changed[a as usize].max(self.changed[b as usize]) <= *clock) {
+    /// Is another one after each change of either.
+    fn stamp(&self, a: u32, b: u32) -> u32 {
+        self.stamps[a as usize] + self.stamps[b as usize]
+    }
+
+    /// None where it is not worth a try: for its cost, or because it has failed.
+    fn candidate(&self, [a, b]: [u32; 2]) -> Option<Candidate> {
+        if self.failed.contains(&(u64::from(a) << 32 | u64::from(b))) {
             return None;
         }
         let cost = self.best(a, b).1;
@@ -182,7 +178,8 @@ impl Work {
         }
         let [p, q] = [a, b].map(|vertex| self.surface.vertices[vertex as usize].at);
         let order = cost + LENGTH_WEIGHT * area * (p - q).length_squared();
-        Some(Reverse((order.to_bits(), a, b, self.stamps[a as usize], self.stamps[b as usize])))
+        let [a, b, stamp] = [a, b, self.stamp(a, b)].map(u128::from);
+        Some(u128::from(order.to_bits() >> 32) << 96 | a << 64 | b << 32 | stamp)
     }
 
     /// The best place for an edge to collapse to, and its cost.
@@ -242,7 +239,7 @@ impl Work {
             }
         }
         if verdict != Verdict::Good {
-            self.failed.insert(u64::from(a) << 32 | u64::from(b), self.clock);
+            self.failed.insert(u64::from(a) << 32 | u64::from(b));
         }
     }
 }
@@ -251,23 +248,6 @@ impl Work {
 pub(super) fn up(value: f64) -> f32 {
     let rounded = value as f32;
     if f64::from(rounded) < value { rounded.next_up() } else { rounded }
-}
-
-/// All edges in order, with the number of their faces, and one of these.
-pub(super) fn edges_of(surface: &Surface) -> Vec<([u32; 2], u32, u32)> {
-    let mut all: Vec<(u64, u32)> = Vec::with_capacity(surface.left * 3);
-    for (number, face) in surface.faces.iter().enumerate() {
-        if surface.is_there(number as u32) {
-            let [a, b, c] = face.corners;
-            for [p, q] in [[a, b], [b, c], [c, a]] {
-                all.push((u64::from(p.min(q)) << 32 | u64::from(p.max(q)), number as u32));
-            }
-        }
-    }
-    all.sort_unstable();
-    all.chunk_by(|a, b| a.0 == b.0)
-        .map(|same| ([(same[0].0 >> 32) as u32, same[0].0 as u32], same.len() as u32, same[0].1))
-        .collect()
 }
 
 /// Mixes the two numbers of an edge.

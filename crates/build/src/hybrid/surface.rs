@@ -87,6 +87,12 @@ impl Surface {
         !self.is_gone[face as usize]
     }
 
+    /// Numbers and corners of those that are.
+    pub(super) fn there(&self) -> impl Iterator<Item = (u32, [u32; 3])> + Clone {
+        let all = self.faces.iter().zip(&self.is_gone).enumerate();
+        all.filter(|(_, (_, is_gone))| !**is_gone).map(|(number, (face, _))| (number as u32, face.corners))
+    }
+
     /// Takes a face away.
     pub(super) fn remove(&mut self, face: u32) {
         self.left -= usize::from(!self.is_gone[face as usize]);

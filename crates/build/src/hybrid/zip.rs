@@ -7,6 +7,7 @@
 //! Source: the vertex-vertex and vertex-edge contractions of Borodin, Gumhold, Guthe & Klein, *High-quality simplification with
 //! generalized pair contractions*, GraphiCon 2003.
 
+use super::edges::{self, Side};
 use super::patch::{Face, Patch};
 use super::simplify::up;
 use super::weld::PlaceHasher;
@@ -33,7 +34,7 @@ struct Edge {
 
 /// Closes what is narrow enough.
 pub(super) fn zip(patch: &mut Patch, limit: f64) {
-    let edges = borders(&patch.faces);
+    let edges = borders(patch.vertices.len(), &patch.faces);
     if edges.is_empty() {
         return;
     }
@@ -42,22 +43,15 @@ pub(super) fn zip(patch: &mut Patch, limit: f64) {
 }
 
 /// Edges of one face, in order of the faces.
-fn borders(faces: &[Face]) -> Vec<Edge> {
-    let mut sorted: Vec<(u64, u32)> = Vec::with_capacity(faces.len() * 3);
-    for (number, face) in faces.iter().enumerate() {
-        for side in 0..3 {
-            let (a, b) = (face.corners[side], face.corners[(side + 1) % 3]);
-            sorted.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), (number * 3 + side) as u32));
-        }
-    }
-    sorted.sort_unstable();
-    let single = sorted.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1);
-    let mut single: Vec<u32> = single.collect();
-    single.sort_unstable();
-    let edge = |at: &u32| {
-        let (face, side) = (at / 3, (at % 3) as usize);
-        let corners = faces[face as usize].corners;
-        Edge { ends: [corners[side], corners[(side + 1) % 3]], face, is_open: true }
+fn borders(vertices: usize, faces: &[Face]) -> Vec<Edge> {
+    let numbered = faces.iter().enumerate().map(|(number, face)| (number as u32, face.corners));
+    let sides = edges::sides(vertices, numbered);
+    let mut single: Vec<Side> = edges::by_edge(&sides).filter(|same| same.len() == 1).map(|same| same[0]).collect();
+    single.sort_unstable_by_key(|side| (side.face, side.first));
+    let edge = |side: &Side| {
+        let corners = faces[side.face as usize].corners;
+        let first = side.first as usize;
+        Edge { ends: [corners[first], corners[(first + 1) % 3]], face: side.face, is_open: true }
     };
     single.iter().map(edge).collect()
 }
@@ -190,7 +184,7 @@ fn most_errors(vertices: usize, faces: &[Face]) -> Vec<f32> {
 /// Border vertices go into the border edges that they lie at.
 fn insert(patch: &mut Patch, limit: f64) {
     let reach = REACH * limit;
-    let mut edges = borders(&patch.faces);
+    let mut edges = borders(patch.vertices.len(), &patch.faces);
     let Patch { vertices, faces, .. } = patch;
     let length = |edge: &Edge| (vertices[edge.ends[0] as usize].at - vertices[edge.ends[1] as usize].at).length();
     let mean = edges.iter().map(length).sum::<f64>() / edges.len().max(1) as f64;

@@ -7,13 +7,17 @@ use super::super::looks::{FaceLook, Looks};
 use super::super::overlay::{Border, MOST_VERTICES, Verdict};
 use super::super::patch::{Face, total};
 use super::super::surface::Surface;
-use super::{Operation, Work, up};
+use super::{HOPELESS_LOOK, Operation, Work, up};
 use glam::DVec3;
+use std::cmp::Reverse;
 
 /// Edges longer than so many times the limit are not tried where nothing can be laid flat.
 const COVERED_LENGTH: f64 = 0.7;
 /// Faces around both ends of an edge that are covered at most.
 const MOST_COVERED: usize = 48;
+
+/// Not in the overlay.
+const NO_NAME: u8 = u8::MAX;
 
 /// Buffers of one operation.
 #[derive(Default)]
@@ -23,6 +27,10 @@ pub(super) struct Star {
     of_kept: Vec<u32>,
     /// Vertices of the overlay.
     names: Vec<u32>,
+    /// Of all vertices: the place in `names`, or [`NO_NAME`].
+    name_of: Vec<u8>,
+    /// Other ends of the edges of what stays.
+    ring: Vec<u32>,
     /// Faces that change.
     old: Vec<u32>,
     /// Those of them that stay, in the order of the overlay's new ones.
@@ -39,6 +47,10 @@ pub(super) struct Star {
 }
 
 impl Star {
+    pub(super) fn new(vertices: usize) -> Self {
+        Self { name_of: vec![NO_NAME; vertices], ..Self::default() }
+    }
+
     /// Faces around what stays that also have another vertex, by its name.
     fn faces_at_edge(&self, surface: &Surface, other: u8) -> usize {
         let other = self.names[usize::from(other)];
@@ -155,17 +167,23 @@ impl Work {
         Verdict::Good
     }
 
-    /// Fills the overlay with both sides; false where they are no discs, or one would be glued to itself.
+    /// Fills the overlay with both sides; false where they are no discs, one would be glued to itself, or it is not worth a try.
     fn lay_out(&mut self, operation: &Operation) -> bool {
         let Operation { gone, kept, moved } = *operation;
         let Self { surface, overlay, star, .. } = self;
-        let Star { of_gone, of_kept, names, old, changed, .. } = star;
+        let Star { of_gone, of_kept, names, name_of, old, changed, .. } = star;
+        names.iter().for_each(|vertex| name_of[*vertex as usize] = NO_NAME);
         for list in [&mut *of_gone, of_kept, old, changed, names] {
             list.clear();
         }
         surface.around(gone, of_gone);
         surface.around(kept, of_kept);
         overlay.clear();
+        let most = HOPELESS_LOOK * self.limit.error;
+        let is_hopeless = |face: &u32| f64::from(surface.faces[*face as usize].app) > most;
+        if of_gone.iter().any(is_hopeless) || moved.is_some() && of_kept.iter().any(is_hopeless) {
+            return false;
+        }
         old.extend_from_slice(of_gone);
         if moved.is_some() {
             old.extend(of_kept.iter().filter(|face| !surface.faces[**face as usize].corners.contains(&gone)));
@@ -173,17 +191,19 @@ impl Work {
         if old.len() > MOST_VERTICES - 4 {
             return false;
         }
-        names.extend([gone, kept]);
-        let mut name = |vertex: u32| match names.iter().position(|name| *name == vertex) {
-            Some(known) => Some(known as u8),
-            None if names.len() < MOST_VERTICES - 1 => {
+        let mut name = |vertex: u32| {
+            let name = &mut name_of[vertex as usize];
+            if *name == NO_NAME && names.len() < MOST_VERTICES - 1 {
+                *name = names.len() as u8;
                 names.push(vertex);
-                Some(names.len() as u8 - 1)
             }
-            None => None,
+            Some(*name).filter(|name| *name != NO_NAME)
         };
         // Name 0 is what vanishes, 1 is what stays; where that moves, it vanishes as well, and the last name is where to.
         const KEPT: u8 = 1;
+        for end in [gone, kept] {
+            name(end);
+        }
         for face in old.iter() {
             let corners = surface.faces[*face as usize].corners;
             let [Some(a), Some(b), Some(c)] = corners.map(&mut name) else { return false };
@@ -264,15 +284,15 @@ impl Work {
             overlay.border = Some(Border { before: other, gone: 0 });
         }
         // Neighbours of both ends.
-        let of_gone = overlay.old.iter().filter(|face| face.contains(&0)).flatten();
-        let mut around_gone = 0u64;
-        of_gone.for_each(|name| around_gone |= 1 << name);
-        let mut around_kept = 0u64;
-        for face in &star.of_kept {
-            for corner in surface.faces[*face as usize].corners {
-                if let Some(name) = star.names.iter().position(|name| *name == corner) {
-                    around_kept |= 1 << name;
-                }
+        let around = |center: u8| {
+            let faces = overlay.old.iter().filter(|face| face.contains(&center));
+            faces.flatten().fold(0u64, |names, name| names | 1 << name)
+        };
+        let (around_gone, mut around_kept) = (around(0), around(1));
+        if !is_moved {
+            for face in &star.of_kept {
+                let names = surface.faces[*face as usize].corners.map(|corner| star.name_of[corner as usize]);
+                names.iter().filter(|name| **name != NO_NAME).for_each(|name| around_kept |= 1 << name);
             }
         }
         let common = around_gone & around_kept & !3;
@@ -308,8 +328,6 @@ impl Work {
         surface.faces[other as usize].geo = geo;
         surface.remove(ear);
         looks.clear(ear);
-        self.clock += 1;
-        surface.faces[other as usize].corners.iter().for_each(|corner| self.changed[*corner as usize] = self.clock);
         self.stamps[gone as usize] += 1;
         self.stamps[kept as usize] += 1;
         self.requeue(kept);
@@ -383,10 +401,6 @@ impl Work {
     fn do_it(&mut self, operation: &Operation, laid: Laid) {
         let Operation { gone, kept, moved } = *operation;
         let Self { surface, overlay, cover, star, looks, bases, quadrics, stamps, .. } = self;
-        self.clock += 1;
-        for face in &star.old {
-            surface.faces[*face as usize].corners.iter().for_each(|corner| self.changed[*corner as usize] = self.clock);
-        }
         if self.limit.keeps_looks {
             star.old.iter().for_each(|face| looks.clear(*face));
             for (sample, face) in &star.places {
@@ -430,18 +444,18 @@ impl Work {
         let Self { surface, star, .. } = self;
         star.of_kept.clear();
         surface.around(vertex, &mut star.of_kept);
-        star.names.clear();
+        star.ring.clear();
         for face in &star.of_kept {
             for corner in surface.faces[*face as usize].corners {
-                if corner != vertex && !star.names.contains(&corner) {
-                    star.names.push(corner);
+                if corner != vertex && !star.ring.contains(&corner) {
+                    star.ring.push(corner);
                 }
             }
         }
-        for at in 0..self.star.names.len() {
-            let other = self.star.names[at];
-            if let Some(candidate) = self.candidate(vertex.min(other), vertex.max(other)) {
-                self.queue.push(candidate);
+        for at in 0..self.star.ring.len() {
+            let other = self.star.ring[at];
+            if let Some(candidate) = self.candidate([vertex.min(other), vertex.max(other)]) {
+                self.queue.push(Reverse(candidate));
             }
         }
     }
