@@ -84,7 +84,7 @@ proptest! {
 
     #[test]
     fn random_trees_are_cut_as_by_the_slow_traversal(
-        triangles in 1usize..2500, seed in any::<u64>(),
+        triangles in 1usize..800, seed in any::<u64>(),
         looks in prop::collection::vec((cameras(), thresholds(), cuttings()), 12),
     ) {
         let mut scene = scene(soup(triangles, seed), 1 << 30);
