@@ -207,9 +207,8 @@ fn points_as_large_as_they_are_apart_close_a_surface() {
 }
 
 /// A model whose nodes are apart: each is shrunk towards its middle by a part of its error.
-fn with_gaps(error: f64) -> (Mesh, Model) {
-    let soup = wavy(80);
-    let grid = Grid::around(&soup);
+fn with_gaps(soup: &Soup, error: f64) -> (Mesh, Model) {
+    let grid = Grid::around(soup);
     let mesh = soup.mesh(&grid);
     let whole = soup.model(&grid, 4, Extra { error_geo: error as f32, ..Extra::default() });
     let most = (error * 0.55 / grid.step()) as i32;
@@ -243,7 +242,7 @@ fn lines_close_the_gaps_between_nodes() {
             .depths_f32()
             .into_iter()
             .fold(f32::INFINITY, f32::min);
-        let (mesh, model) = with_gaps(error_px * f64::from(nearest) / camera.focal_px());
+        let (mesh, model) = with_gaps(&wavy(80), error_px * f64::from(nearest) / camera.focal_px());
         let bvh = Bvh::build(&mesh);
         let truth = Truth::trace(&bvh, &camera, MATERIAL_SRGB);
         let touched = supersampled_coverage(&bvh, &camera, 4);
@@ -278,11 +277,52 @@ fn lines_close_the_gaps_between_nodes() {
     }
 }
 
+/// A level square, `rows` × `rows` quads, that faces upwards.
+fn sheet(rows: u32) -> Soup {
+    let mut soup = Soup::default();
+    let place = |at: u32| 2.0 * f64::from(at) / f64::from(rows) - 1.0;
+    for row in 0..=rows {
+        for column in 0..=rows {
+            soup.positions.push(DVec3::new(place(row), 0.0, place(column)));
+            soup.normals.push(Vec3::Y);
+        }
+    }
+    let at = |row: u32, column: u32| row * (rows + 1) + column;
+    for (row, column) in (0..rows).flat_map(|row| (0..rows).map(move |column| (row, column))) {
+        let [a, b, c, d] = [at(row, column), at(row, column + 1), at(row + 1, column + 1), at(row + 1, column)];
+        soup.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    soup
+}
+
+#[test]
+fn lines_seen_from_behind_look_like_what_is_beside_them() {
+    let Some(mut renderer) = renderer() else { return };
+    // From below, and so flat that normals which point away are taken for those of a silhouette (light.wgsl, GRAZING).
+    let camera = Camera::look_at(DVec3::new(0.0, -0.12, -1.6), DVec3::ZERO, DVec3::Y, FOV, SIZE);
+    let (_, model) = with_gaps(&sheet(60), 3.0 / camera.focal_px());
+    let [without, with] = [false, true].map(|draws_lines| {
+        let drawn = picture(&mut renderer, &camera, &[(Similarity::IDENTITY, &model.draw(0, draws_lines))]);
+        show(&format!("behind_{draws_lines}"), &drawn);
+        drawn
+    });
+    let color = |picture: &Picture, at: usize| picture.rgba.as_chunks::<4>().0[at];
+    let shown = |at: &usize| without.depth[*at].is_finite();
+    let sheet = color(&without, (0..SIZE.pixels()).find(shown).expect("the sheet is in view"));
+    let closed: Vec<usize> = (0..SIZE.pixels()).filter(|at| with.depth[*at].is_finite() && !shown(at)).collect();
+    assert!(closed.len() > 100, "{} pixels of lines", closed.len());
+    for at in closed {
+        let of_line = color(&with, at);
+        let off = std::iter::zip(of_line, sheet).map(|(a, b)| a.abs_diff(b)).max();
+        assert!(off <= Some(2), "pixel {at} is {of_line:?}, the sheet {sheet:?}");
+    }
+}
+
 #[test]
 fn small_or_large_in_one_phase_or_two_all_ways_show_the_same() {
     let (Some(mut native), Some(mut baseline)) = (renderer(), renderer_at(GpuLevel::WebGpu)) else { return };
     assert!(!baseline.gpu().has_wide_keys());
-    let (_, gaps) = with_gaps(0.01);
+    let (_, gaps) = with_gaps(&wavy(80), 0.01);
     let (points, spacing) = as_points(50);
     let points = points.model(&Grid::around(&points), 2, Extra { spacing, ..Extra::default() });
     let cube = cube().model(&Grid::around(&cube()), 1, Extra { error_geo: 0.01, ..Extra::default() });
