@@ -5,10 +5,11 @@
 
 mod cli_support;
 
-use cli_support::{Ran, command, folder, shape, splat_statue as statue};
+use cli_support::{Ran, command, folder, gigalod, names_in, shape, splat_statue as statue};
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -342,6 +343,54 @@ fn a_window_that_is_destroyed_ends_the_viewer_with_a_line() {
         assert_eq!(ran.status, 1, "{ran:?}");
         assert_eq!(ran.stderr, "error: the window was closed by force\n");
     }
+}
+
+/// Processes that build `model`, and how modest each is: 0 to 19.
+fn builds_of(model: &Path) -> Vec<(i32, i64)> {
+    let processes = std::fs::read_dir("/proc").unwrap().filter_map(|entry| Some(entry.ok()?.path()));
+    let build = |process: PathBuf| {
+        let arguments = std::fs::read(process.join("cmdline")).ok()?;
+        let arguments: Vec<&[u8]> = arguments.split(|byte| *byte == 0).collect();
+        let is_build = arguments.contains(&b"build".as_slice()) && arguments.contains(&model.as_os_str().as_bytes());
+        let stat = std::fs::read_to_string(process.join("stat")).ok()?;
+        // Counted after the name, which may have blanks.
+        let mut numbers = stat.rsplit_once(") ")?.1.split(' ').skip(16);
+        let nice = numbers.next()?.parse().ok()?;
+        is_build.then_some((process.file_name()?.to_str()?.parse().ok()?, nice))
+    };
+    processes.filter_map(build).collect()
+}
+
+/// The window has what it needs while a model is built, and who ends the viewer ends the build.
+#[test]
+fn a_build_stands_back_and_ends_with_the_viewer() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    let model = place.path().join("large.ply");
+    gigalod([
+        OsStr::new("synth"),
+        "statue".as_ref(),
+        "--triangles".as_ref(),
+        "600k".as_ref(),
+        "-o".as_ref(),
+        model.as_ref(),
+    ])
+    .done();
+    let built = || -> Vec<String> {
+        let cache = folder().join("cache").join("gigalod");
+        let names = if cache.is_dir() { names_in(&cache) } else { Vec::new() };
+        names.into_iter().filter(|name| name.ends_with(".glod")).collect()
+    };
+    let before = built();
+    let mut viewing = screen.view(place.path(), [&model]);
+    waits_until(|| builds_of(&model).first().is_some_and(|(_, nice)| *nice == 10));
+    let child = viewing.child.take().unwrap();
+    let id = nix::unistd::Pid::from_raw(child.id() as i32);
+    nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGTERM).unwrap();
+    let ran = Ran::of(child.wait_with_output().unwrap());
+    assert_eq!(ran.status, 130, "{ran:?}");
+    waits_until(|| builds_of(&model).is_empty());
+    assert_eq!(built(), before, "it did not finish");
 }
 
 #[test]

@@ -52,6 +52,8 @@ pub(crate) fn run() -> ExitCode {
     };
     // Where there are no signals to handle, files of an interrupted run stay behind; that is no reason not to run.
     let _ = ctrlc::set_handler(|| {
+        #[cfg(feature = "view")]
+        view_files::abandon_builds();
         let kept = gigalod_build::abandon();
         // Where nobody can be told, it ends all the same.
         let _ = writeln!(io::stderr(), "interrupted");

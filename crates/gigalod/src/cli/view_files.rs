@@ -22,7 +22,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// How often a build is asked whether it is done.
@@ -185,6 +185,8 @@ impl Files {
             .spawn()
             .map_err(wrong)?;
         let lines = child.stderr.take();
+        stand_back(&child);
+        builds().push(child.id());
         let (progress, name) = (work.clone(), input.file_name().unwrap_or_default().to_string_lossy().into_owned());
         let listener = std::thread::spawn(move || {
             let mut errors = Vec::new();
@@ -200,18 +202,28 @@ impl Files {
             }
             errors
         });
+        let mut is_stopped = false;
         let status = loop {
-            if work.is_cancelled() {
+            if work.is_cancelled() && !is_stopped {
                 stop(&mut child);
-                let _ = listener.join();
-                return Err(CliError::in_file(input, "cancelled"));
+                is_stopped = true;
             }
-            match child.try_wait().map_err(wrong)? {
+            // As long as it is in the list, its number is no other's.
+            let mut builds = builds();
+            let ended = child.try_wait();
+            if !matches!(ended, Ok(None)) {
+                builds.retain(|build| *build != child.id());
+            }
+            drop(builds);
+            match ended.map_err(wrong)? {
                 Some(status) => break status,
                 None => std::thread::sleep(LOOK_EVERY),
             }
         };
         let errors = listener.join().unwrap_or_default();
+        if is_stopped {
+            return Err(CliError::in_file(input, "cancelled"));
+        }
         if status.success() {
             return Ok(());
         }
@@ -225,17 +237,49 @@ impl Files {
     }
 }
 
+/// Processes that build for the viewer.
+static BUILDS: Mutex<Vec<u32>> = Mutex::new(Vec::new());
+
+fn builds() -> MutexGuard<'static, Vec<u32>> {
+    BUILDS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends all builds that run for the viewer, which is being ended itself: nobody waits for them.
+pub(crate) fn abandon_builds() {
+    builds().iter().for_each(|build| interrupt(*build));
+}
+
 /// Ends a build as Ctrl-C would, so that it cleans up.
-fn stop(child: &mut Child) {
+fn stop(build: &mut Child) {
+    #[cfg(unix)]
+    interrupt(build.id());
+    #[cfg(not(unix))]
+    let _ = build.kill();
+}
+
+/// Elsewhere the system has no such signal, and a build goes on without the viewer until it is done.
+fn interrupt(build: u32) {
     #[cfg(unix)]
     {
-        let id = nix::unistd::Pid::from_raw(child.id() as i32);
+        let id = nix::unistd::Pid::from_raw(build as i32);
         // One that has just ended needs no signal.
         let _ = nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGINT);
     }
     #[cfg(not(unix))]
-    let _ = child.kill();
-    let _ = child.wait();
+    let _ = build;
+}
+
+/// Lets a build have what processors the window leaves: a picture that a person waits for comes first.
+fn stand_back(build: &Child) {
+    #[cfg(unix)]
+    {
+        /// Of -20 to 19, the last of which is the most modest.
+        const PRIORITY: i32 = 10;
+        // Threads that it begins later inherit it.
+        let _ = rustix::process::setpriority_process(Some(rustix::process::Pid::from_child(build)), PRIORITY);
+    }
+    #[cfg(not(unix))]
+    let _ = build;
 }
 
 /// `read 12 %, 3 s left` → what is done, how much of it, and how long it still takes.
