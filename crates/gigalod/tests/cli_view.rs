@@ -345,6 +345,31 @@ fn a_window_that_is_destroyed_ends_the_viewer_with_a_line() {
     }
 }
 
+/// Seconds of processor time that a process has taken.
+fn cpu_seconds(process: u32) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
+    let ticks = stat.rsplit_once(") ").unwrap().1.split(' ').skip(11).take(2);
+    // Hundredths of a second, on every Linux that there is.
+    ticks.map(|ticks| ticks.parse::<f64>().unwrap()).sum::<f64>() / 100.0
+}
+
+/// Nothing moves, so nothing is done: a person leaves the window open for a day.
+#[test]
+fn a_window_at_rest_takes_no_processor_time() {
+    let Some(screen) = Screen::open() else { return };
+    let place = tempfile::tempdir_in(folder()).unwrap();
+    let viewing = screen.view(place.path(), [&statue().glod]);
+    // Taken when nothing gets finer any more; then the notice of it goes.
+    viewing.takes_picture("splats-1.png");
+    std::thread::sleep(Duration::from_secs(8));
+    let process = viewing.child.as_ref().unwrap().id();
+    let (before, begun) = (cpu_seconds(process), Instant::now());
+    std::thread::sleep(Duration::from_secs(2));
+    let share = (cpu_seconds(process) - before) / begun.elapsed().as_secs_f64();
+    assert!(share < 0.1, "{share} of a processor");
+    viewing.closes();
+}
+
 /// Processes that build `model`, and how modest each is: 0 to 19.
 fn builds_of(model: &Path) -> Vec<(i32, i64)> {
     let processes = std::fs::read_dir("/proc").unwrap().filter_map(|entry| Some(entry.ok()?.path()));

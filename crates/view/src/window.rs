@@ -142,7 +142,8 @@ impl ApplicationHandler<Wake> for App {
 
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(running) = &mut self.running else { return };
-        if running.input.on_window_event(&running.window, &event).repaint {
+        // A frame that is being made is no reason for another, although egui says so.
+        if running.input.on_window_event(&running.window, &event).repaint && event != WindowEvent::RedrawRequested {
             running.ask();
         }
         match event {
