@@ -14,12 +14,14 @@ const SYNTH: &str = "{bytes output points seconds triangles vertices}";
 #[test]
 fn build_and_info_report_exactly_the_keys_of_the_contract() {
     let folder = tempfile::tempdir().unwrap();
-    for (kind, model, options) in [
-        ("splats", splat_statue(), serde_json::json!({ "as": "splats", "up": "y" })),
+    let reductions = "reduction[{below_two inner_nodes level one_child original ratio shading shape}]";
+    for (kind, model, options, reduction) in [
+        ("splats", splat_statue(), serde_json::json!({ "as": "splats", "up": "y" }), "reduction"),
         (
             "hybrid",
             statue(),
             serde_json::json!({ "appearance": "on", "as": "hybrid", "res": "64", "tmax": "4096", "up": "y" }),
+            reductions,
         ),
     ] {
         let ran = run!["build", model.ply, "-o", folder.path().join("a.glod"), "--as", kind, "--json"].done();
@@ -37,7 +39,7 @@ fn build_and_info_report_exactly_the_keys_of_the_contract() {
             format!(
                 "{{attributes[] bounds{{max[] min[]}} bytes closed dicing {INPUT} kind leaves levels nodes \
                  options{{..}} per_level[{{bytes level max_error nodes points triangles}}] raw_bytes \
-                 reference_system repeated units version}}"
+                 {reduction} reference_system repeated units version}}"
             )
         );
         assert_eq!((&ran.json()["kind"], &ran.json()["options"]), (&kind.into(), &options));

@@ -71,7 +71,23 @@ fn built(bench: &Bench, (name, model, is_measured): &Model, rows: &mut Vec<Row>)
             );
             rows.push(at_most(figure, number(measured, "violations"), 0.0, &ratios));
         }
-        levels.push(bench.0.gigalod(&["info", "hybrid.glod"])?);
+        if appearance == "on" && matches!(*name, "dragon" | "statue, 7 M") {
+            let decoded = bench.example("gigalod-format", "decode_speed", &["hybrid.glod"])?;
+            let rate = number(&decoded, "m_triangles_per_second");
+            rows.push(at_least(format!("decoding, {name}, one thread"), rate, 30.0, "M triangles a second"));
+        }
+        let file = bench.0.gigalod(&["info", "hybrid.glod"])?;
+        let reductions = file["reduction"].as_array().cloned().unwrap_or_default();
+        let sum = |what| reductions.iter().map(|level| number(level, what)).sum::<f64>();
+        let [inner, below, shading, original, one_child, shape] =
+            ["inner_nodes", "below_two", "shading", "original", "one_child", "shape"].map(sum);
+        rows.push(plain(
+            format!("inner nodes with more than half of what their children have, {name}, appearance {appearance}"),
+            format!(
+                "{below} of {inner}: {shading} for their shading, {original} above leaves as coarse, {one_child} with one child, {shape} for their shape"
+            ),
+        ));
+        levels.push(file);
     }
     if matches!(*name, "dragon" | "statue, 7 M") {
         averages(name, &levels, rows);

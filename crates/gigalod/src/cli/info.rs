@@ -5,6 +5,7 @@ use super::error::{CliError, Outcome};
 use super::files;
 use super::parse::readable_bytes;
 use super::progress::Console;
+use super::reduction::{self, Reduction};
 use gigalod_format::{Bounds, Dicing, InputCounts, LevelSummary, ReferenceSystem};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,6 +31,8 @@ struct InfoReport<'a> {
     reference_system: Option<&'a ReferenceSystem>,
     attributes: &'a [String],
     per_level: &'a [LevelSummary],
+    /// Of hybrid files.
+    reduction: Option<Vec<Reduction>>,
 }
 
 pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliError> {
@@ -56,6 +59,7 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
         reference_system: metadata.reference_system.as_ref(),
         attributes: &metadata.attributes,
         per_level: &metadata.per_level,
+        reduction: model.hybrid().map(|file| reduction::of(file.skeleton())),
     };
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
@@ -104,15 +108,21 @@ pub(crate) fn run(args: &InfoArgs, _console: &Console) -> Result<Outcome, CliErr
     }
     let error = if unit.is_empty() { "max error".to_owned() } else { format!("max error/{unit}") };
     // Splats are points and nothing else, one a node.
-    let payload = |triangles: &dyn Display, points: &dyn Display| match is_hybrid {
-        true => format!(" {triangles:>12} {points:>12}"),
+    let payload = |triangles: &dyn Display, points: &dyn Display, ratio: &dyn Display| match is_hybrid {
+        true => format!(" {triangles:>12} {points:>12} {ratio:>7}"),
         false => String::new(),
     };
-    let names = payload(&"triangles", &"points");
+    let names = payload(&"triangles", &"points", &"ratio");
     let _ = writeln!(text, "\n{:>5} {:>12}{names} {:>12} {error:>14}", "level", "nodes", "bytes");
     for LevelSummary { level, nodes, triangles, points, bytes, max_error } in &metadata.per_level {
-        let payload = payload(triangles, points);
+        let of_level = |reduction: &&Reduction| reduction.level == *level;
+        let reduction = json.reduction.as_deref().unwrap_or_default().iter().find(of_level);
+        let ratio = reduction.map_or("-".into(), |reduction| format!("{:.2}", reduction.ratio));
+        let payload = payload(triangles, points, &ratio);
         let _ = writeln!(text, "{level:>5} {nodes:>12}{payload} {bytes:>12} {max_error:>14.6e}");
+    }
+    if let Some(levels) = &json.reduction {
+        text.push_str(&reduction::describe(levels));
     }
     Ok(Outcome::new(&json, text))
 }

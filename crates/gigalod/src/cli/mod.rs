@@ -16,6 +16,7 @@ mod inputs;
 mod parse;
 mod path_file;
 mod progress;
+mod reduction;
 mod render;
 mod scene_file;
 mod stage;
