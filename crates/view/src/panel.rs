@@ -20,11 +20,21 @@ use std::path::{Path, PathBuf};
 pub(crate) const WIDTH: f32 = 320.0;
 
 /// Colours of the interface: egui's dark ones, with text that is easier to read.
-pub(crate) fn visuals() -> Visuals {
+fn visuals() -> Visuals {
     let mut visuals = Visuals::dark();
     visuals.widgets.noninteractive.fg_stroke.color = Color32::from_gray(190);
     visuals.widgets.inactive.fg_stroke.color = Color32::from_gray(210);
     visuals
+}
+
+/// Where frames take a second, a button goes down in one and comes up in the next, however quick the hand: that is a click all the same.
+const LONGEST_CLICK: f64 = 10.0;
+
+/// How an interface looks, and what it takes for a click.
+pub(crate) fn prepare(context: &egui::Context) {
+    context.set_theme(egui::Theme::Dark);
+    context.set_visuals_of(egui::Theme::Dark, visuals());
+    context.options_mut(|options| options.input_options.max_click_duration = LONGEST_CLICK);
 }
 
 impl Viewer {

@@ -233,6 +233,18 @@ fn a_point_is_where_the_click_was_and_not_where_the_mouse_went_in_the_same_frame
 }
 
 #[test]
+fn a_click_is_one_where_the_button_comes_up_a_long_frame_later() {
+    let mut person = Person::opens(&["statue.glod"]);
+    person.clicks_on("Pick points (M)");
+    let at = pos2(260.0, 300.0);
+    person.button(at, PointerButton::Primary, true, Modifiers::NONE);
+    // Two seconds, which egui on its own takes for a button that was held.
+    person.harness.run_steps(120);
+    person.button(at, PointerButton::Primary, false, Modifiers::NONE);
+    person.waits_until(|viewer| viewer.measuring.points().count() == 1);
+}
+
+#[test]
 fn a_click_on_a_models_name_looks_at_it() {
     let mut person = Person::opens(&["statue.glod"]);
     let home = person.viewer().own_viewpoint();

@@ -4,7 +4,7 @@ use crate::clock::thread_cpu_ms;
 use crate::forced::{Forced, unless_forced};
 use crate::host::Host;
 use crate::mailbox::{Mailbox, Order};
-use crate::panel::visuals;
+use crate::panel::prepare;
 use crate::picker;
 use crate::report::{Measured, Report};
 use crate::settings::Options;
@@ -235,8 +235,7 @@ impl Running {
         viewer.adapter = painter.gpu().adapter();
 
         let context = egui::Context::default();
-        context.set_theme(egui::Theme::Dark);
-        context.set_visuals_of(egui::Theme::Dark, visuals());
+        prepare(&context);
         let most = Some(painter.gpu().max_picture_edge() as usize);
         let scale = Some(window.scale_factor() as f32);
         let input = egui_winit::State::new(context.clone(), ViewportId::ROOT, &*window, scale, None, most);

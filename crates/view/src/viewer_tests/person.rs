@@ -2,6 +2,7 @@
 
 use crate::host::{Entry, Folder, Host, Kind, Model, Opened, Preview, Work};
 use crate::mailbox::Mailbox;
+use crate::panel::prepare;
 use crate::pick::{Hit, Ray};
 use crate::picker;
 use crate::settings::{FirstLook, Options, Settings};
@@ -145,6 +146,7 @@ impl Person {
             .with_size(vec2(SIZE.width as f32, SIZE.height as f32))
             .with_step_dt(1.0 / 60.0)
             .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui, SIZE), viewer);
+        prepare(&harness.ctx);
         harness.run_steps(2);
         let mut person = Self { harness, files, _folder: folder };
         person.waits_until(|viewer| viewer.jobs.running().is_empty());
