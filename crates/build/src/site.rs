@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// Program, version and revision of the builder, in files and in journals; what was built by another is not gone on with.
 ///
 /// The revision goes up with each change of what is built of the same input, as the test `bytes_are_pinned` finds it.
-pub const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"), " r2");
+pub const GENERATOR: &str = concat!("gigalod ", env!("CARGO_PKG_VERSION"), " r3");
 
 /// All that is decided before the first byte is read.
 pub(crate) struct Site {
