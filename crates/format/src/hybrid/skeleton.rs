@@ -49,7 +49,7 @@ pub struct Root {
 }
 
 /// What is known of a node without its page.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeRecord {
     /// Its level: 0 is the root. Its cell's edge is the root's divided by 2 to this.
     pub level: u32,
